@@ -24,15 +24,16 @@ Read the package in this order. A module imports only from its own entry of the 
 20. `structure`    modes and drive of the rig
 21. `hybrid`       motion from event to event by steps of order 8
 22. `points`       steps of order 2: many contact points, and sweeps over many cases
-23. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
-24. `response`     measures of a run: outcome, events, levels and free vibration
-25. `wear`         wear depth over many cycles
-26. `runs`         patch, bench and rig: static contact, friction and dynamics combined
-27. `identify`     parameters from measurements, with confidence intervals
-28. `campaigns`    studies with many runs: fits, error against cost, sweeps
-29. `export`       summary, netCDF, VTK, report
-30. `api`          Python interface: load, build, plan and run
-31. `commands`     verbs of the command line
+23. `time_steps`   steps of order 2 of contact points under every law with every effect
+24. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
+25. `response`     measures of a run: outcome, events, levels and free vibration
+26. `wear`         wear depth over many cycles
+27. `runs`         patch, bench and rig: static contact, friction and dynamics combined
+28. `identify`     parameters from measurements, with confidence intervals
+29. `campaigns`    studies with many runs: fits, error against cost, sweeps
+30. `export`       summary, netCDF, VTK, report
+31. `api`          Python interface: load, build, plan and run
+32. `commands`     verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. All imports are lazy: a module
 that is imported as a whole, as in `from .contact import unilateral`, is loaded on first use (`lazy_imports`).

@@ -19,7 +19,6 @@ False: the event-driven engine is then compiled 2 CPU seconds faster and runs as
 twice as long without them.
 """
 
-import ast
 import gc
 import hashlib
 import os
@@ -31,7 +30,6 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location, spec_from_loader
-from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
 from threading import RLock
 from time import monotonic, process_time, sleep, time
@@ -86,15 +84,6 @@ CODE_LOADING_LOCK = RLock()
 # Converter of the arguments of all functions, because several functions get the same tuples in turn.
 CONVERTER = machine.ArgumentConverter()
 REPORT = [None]  # callback of the last run, which receives a message if numba compiles a function
-ARITHMETIC_OPERATORS = {
-    ast.Add: add,
-    ast.Sub: sub,
-    ast.Mult: mul,
-    ast.Div: truediv,
-    ast.Pow: pow,
-    ast.USub: neg,
-    ast.UAdd: pos,
-}
 
 
 def hash_kernels() -> str:
@@ -169,8 +158,8 @@ def _choose_folder() -> tuple[Path, str]:
 class KernelModule:
     """Kernel module that is imported when it is needed.
 
-    Its attributes are compiled functions (`KernelFunction`) and constants, which are read from the source without an
-    import. Any other attribute imports the module.
+    Its attributes are compiled functions (`KernelFunction`), whose names are read from the source. Any other attribute
+    imports the module.
 
     Parameters
     ----------
@@ -189,17 +178,11 @@ class KernelModule:
         self._functions = {}
 
     def __getattr__(self, name: str):
-        """Return a constant or a KernelFunction of the module.
-
-        The module itself is imported for other names.
-        """
+        """Return a KernelFunction of the module, which is imported for other names."""
         if name.startswith("__"):
             raise AttributeError(f"{self.__name__} has no {name}")
         if name not in self._functions:
-            constants, functions = _read_names(self._source)
-            if name in constants:
-                return constants[name]
-            if name not in functions:
+            if name not in _list_functions(self._source):
                 return getattr(self.load_module(), name)
             file_prefix = f"{self.__name__.removeprefix('patchfem.')}.{name}-"
             self._functions[name] = KernelFunction(self, name, file_prefix)
@@ -208,7 +191,7 @@ class KernelModule:
     @property
     def is_vectorised(self) -> bool:
         """Whether loops of the module may become vector instructions; its constant IS_VECTORISED, by default True."""
-        return _read_names(self._source)[0].get("IS_VECTORISED", True)
+        return "\nIS_VECTORISED = False" not in _read_text(self._source)
 
     def load_module(self):
         """Import the module and return it."""
@@ -377,56 +360,15 @@ class KernelFunction:
         return getattr(self.get_dispatcher(), name)
 
 
+def _read_text(source: Path | str) -> str:
+    """Return the text of a module from its file or its text."""
+    return source.read_text("utf-8") if isinstance(source, Path) else source
+
+
 @cache
-def _read_names(source: Path | str) -> tuple[dict, set]:
-    """Read the constants and the names of the compiled functions of a module from its source."""
-    constants = {}
-    functions = set()
-    text = source.read_text("utf-8") if isinstance(source, Path) else source
-    for statement in ast.parse(text).body:
-        if isinstance(statement, ast.FunctionDef) and "njit" in "".join(
-            map(ast.unparse, statement.decorator_list)
-        ):
-            functions.add(statement.name)
-        if isinstance(statement, ast.Assign) and len(statement.targets) == 1:
-            try:
-                value = _evaluate(statement.value, constants)
-            except KeyError:
-                continue
-            _add_constants(constants, statement.targets[0], value)
-    return constants, functions
-
-
-def _add_constants(constants: dict[str, object], target: ast.expr, value) -> None:
-    """Add to the constants what an assignment of a value to a target, a name or several, defines."""
-    is_tuple = isinstance(target, ast.Tuple)
-    names = target.elts if is_tuple else [target]
-    for name, element in zip(names, value if is_tuple else [value]):
-        if isinstance(name, ast.Name):
-            constants[name.id] = element
-
-
-def _evaluate(node: ast.expr, names: dict[str, object]):
-    """Evaluate an expression (`node`) of constants, known names, arithmetic and ranges.
-
-    Raises KeyError for any other expression.
-    """
-    match node:
-        case ast.Constant():
-            return node.value
-        case ast.Name():
-            return names[node.id]
-        case ast.Tuple():
-            return tuple(_evaluate(element, names) for element in node.elts)
-        case ast.Call(ast.Name("range"), arguments, []):
-            return tuple(range(*(_evaluate(argument, names) for argument in arguments)))
-        case ast.UnaryOp():
-            return ARITHMETIC_OPERATORS[type(node.op)](_evaluate(node.operand, names))
-        case ast.BinOp():
-            return ARITHMETIC_OPERATORS[type(node.op)](
-                _evaluate(node.left, names), _evaluate(node.right, names)
-            )
-    raise KeyError(ast.unparse(node))
+def _list_functions(source: Path | str) -> set[str]:
+    """Return the names of the compiled functions of a module from its source."""
+    return set(re.findall(r"(?m)^@njit\b[^@]*?^def (\w+)", _read_text(source)))
 
 
 def load_compiled_module(module: str, report=None):

@@ -15,7 +15,6 @@ from numba.core.base import BaseContext
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
 from numba.core.compiler_machinery import PassManager
-from numba.core.options import DefaultOptions
 from numba.core.registry import CPUDispatcher
 from numba.core.types.functions import BaseFunction
 
@@ -24,52 +23,28 @@ from .integer_enums import register_integer_enums
 from .machine import create_pass_builder, create_target_machine
 from .pass_by_reference import get_argument_type
 
-# Option of numba that omits the wrapper through which C calls a function.
-NO_C_WRAPPER = {"no_cfunc_wrapper": True} if hasattr(DefaultOptions, "no_cfunc_wrapper") else {}
-# Option of numba that omits the wrapper through which Python calls a function.
-NO_PYTHON_WRAPPER = (
-    {"no_cpython_wrapper": True} if hasattr(DefaultOptions, "no_cpython_wrapper") else {}
-)
+# Options of numba that omit the wrappers through which C and Python call a function
+NO_C_WRAPPER = {"no_cfunc_wrapper": True}
+NO_PYTHON_WRAPPER = {"no_cpython_wrapper": True}
 # Options for functions that allocate nothing and need no reference counting, which took
 # 1.3 of the 1.6 us of a time step.
-NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+NJIT_NO_REFCOUNT = {"_nrt": False}
 # Compiler passes of numba that the kernels need. The omitted ones handle closures, generators,
 # `with`, lists, raise and array expressions, which no kernel contains; they took a seventh of the
 # compile time of a loop.
-NUMBA_PASSES = [
-    getattr(home, name, None)
-    for home, names in (
-        (
-            untyped_passes,
-            (
-                "TranslateByteCode",
-                "FixupArgs",
-                "IRProcessing",
-                "RewriteSemanticConstants",
-                "DeadBranchPrune",
-                "GenericRewrites",
-                "ReconstructSSA",
-            ),
-        ),
-        (
-            typed_passes,
-            (
-                "NopythonTypeInference",
-                "PreLowerStripPhis",
-                "IRLegalization",
-                "NativeLowering",
-                "NoPythonBackend",
-            ),
-        ),
-    )
-    for name in names
-]
-# Private methods of numba's JITCodeLibrary that the libraries below replace or call.
-NUMBA_LIBRARY_METHODS = (
-    "_optimize_final_module",
-    "_finalize_final_module",
-    "_finalize_dynamic_globals",
-    "get_pointer_to_function",
+NUMBA_PASSES = (
+    untyped_passes.TranslateByteCode,
+    untyped_passes.FixupArgs,
+    untyped_passes.IRProcessing,
+    untyped_passes.RewriteSemanticConstants,
+    untyped_passes.DeadBranchPrune,
+    untyped_passes.GenericRewrites,
+    untyped_passes.ReconstructSSA,
+    typed_passes.NopythonTypeInference,
+    typed_passes.PreLowerStripPhis,
+    typed_passes.IRLegalization,
+    typed_passes.NativeLowering,
+    typed_passes.NoPythonBackend,
 )
 
 register_integer_enums()
@@ -82,7 +57,7 @@ def njit(cache: bool = False, **options):
     ----------
     cache : bool
         Whether the machine code is stored on disk, as by `numba.njit`. Other functions are compiled only within their
-        callers; if this version of numba lacks the methods `NUMBA_LIBRARY_METHODS`, `numba.njit` compiles them.
+        callers.
     **options
         Options of `numba.njit`. Numba hands `forceinline=True` on to every function that the decorated one calls, and to
         those that these call, unless they set `forceinline=False`. Only functions that call little may set it: the bond
@@ -90,9 +65,8 @@ def njit(cache: bool = False, **options):
     """
     if numba.config.DISABLE_JIT:
         return lambda function: function
-    if cache or not all(hasattr(JITCodeLibrary, name) for name in NUMBA_LIBRARY_METHODS):
-        decorate = numba.njit(**NO_C_WRAPPER, **options)
-        return (lambda function: store_on_disk(decorate(function))) if cache else decorate
+    if cache:
+        return lambda function: store_on_disk(numba.njit(**NO_C_WRAPPER, **options)(function))
     options = {"nopython": True, "boundscheck": None, **options}
     return lambda function: InlinedDispatcher(function, {}, options, UnoptimisedCompiler)
 
@@ -135,8 +109,7 @@ def _memoize_call_types(method):
     return get_call_type
 
 
-if all(hasattr(BaseFunction, name) for name in ("get_call_type", "get_impl_key")):
-    BaseFunction.get_call_type = _memoize_call_types(BaseFunction.get_call_type)
+BaseFunction.get_call_type = _memoize_call_types(BaseFunction.get_call_type)
 
 
 class InlinedDispatcher(CPUDispatcher):
@@ -189,16 +162,7 @@ def compile_unoptimised(
     -------
     target : numba target context
     result : numba CompileResult
-
-    Raises
-    ------
-    NotImplementedError
-        If this version of numba lacks the methods `NUMBA_LIBRARY_METHODS`.
     """
-    if not all(hasattr(JITCodeLibrary, name) for name in NUMBA_LIBRARY_METHODS):
-        raise NotImplementedError(
-            f"this version of numba lacks some of {', '.join(NUMBA_LIBRARY_METHODS)}"
-        )
     options = function.targetoptions | NO_C_WRAPPER | NO_PYTHON_WRAPPER
     dispatcher = CPUDispatcher(function.py_func, function.locals, options, UnoptimisedCompiler)
     argument_types = tuple(
@@ -222,8 +186,6 @@ class UnoptimisedCompiler(Compiler):
         self.state.library = UnoptimisedLibrary(
             self.state.targetctx.codegen(), self.state.func_id.func_qualname
         )
-        if not all(NUMBA_PASSES):
-            return super().define_pipelines()
         passes = PassManager("nopython")
         for numba_pass in NUMBA_PASSES:
             passes.add_pass(numba_pass, numba_pass.__name__)

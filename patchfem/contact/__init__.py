@@ -5,10 +5,11 @@ forces f or pressures, the gap under load, the approach delta and the rotation t
 
     w = g + theta x - delta + C f >= 0,    f >= 0,    f . w = 0.
 
-`gaps` has the shapes of the surfaces. `press.press_strips` presses one or more strips side by side, bare or with
-asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves by the methods of `active_set` and, if they fail,
-of `bounded`, and checks the solution; `strip_compliance` holds C. `edges` and `stiffness` derive quantities
-of a contact set. Read `gaps`, `press`, `unilateral` and `active_set` first.
+`gaps` has the shapes of the surfaces. `press_cases` presses many cases of a pair of pieces on a table of contact sets
+(`set_table`), from which `edges` derives where the contacts end. `press.press_strips` presses one or more strips side by
+side, bare or with asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves a patch as a single case, strips by
+the methods of `active_set` and, if these fail, of `bounded`, and checks the solution; `strip_compliance` holds C. Read
+`gaps`, `set_table`, `press_cases` and `press` first.
 
 `contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `press_path_kernels`).
 
@@ -36,8 +37,12 @@ PUBLIC = {
     "contact_sets": ("ContactSets",),
     "edges": (
         "MIN_CONTACT_PRESSURE_RATIO",
+        "ContactEdges",
+        "EdgeCells",
         "contact_intervals",
         "compute_edge_offset",
+        "find_edges",
+        "find_intervals",
         "find_pressure_edges",
         "parabola_change",
         "snap_to_steps",
@@ -49,6 +54,10 @@ PUBLIC = {
         "StripModel",
         "press_strips",
         "split_into_strips",
+    ),
+    "press_cases": (
+        "HolderCases",
+        "press_on_table",
     ),
     "press_cells": (
         "FaceLoading",
@@ -71,10 +80,11 @@ PUBLIC = {
         "make_set_arrays",
         "hash_set",
     ),
-    "stiffness": (
-        "coupled_stiffness",
-        "tangential_stiffness",
+    "set_table": (
+        "SetTable",
+        "solve_set",
     ),
+    "stiffness": ("tangential_stiffness",),
     "strip_compliance": ("StripCompliance",),
     "unilateral": ("INDEFINITE_COMPLIANCE_MESSAGE",),
 }

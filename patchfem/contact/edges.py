@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .strip_compliance import StripCompliance
+from .set_table import find_set_ends
 
 # Smallest pressure, relative to the largest, at which a node with a smooth asperity law counts as
 # in contact
@@ -99,77 +99,88 @@ def compute_edge_fraction(force: float, force_rate: float, gap: float, gap_rate:
     return float(approach_since_entry / total) if total > 0 else 0.5
 
 
-class SetFactor:
-    """Cholesky factor of the compliance between the nodes of a contact set.
+class ContactEdges(NamedTuple):
+    """Edges of n contact sets, by increasing x; sets with fewer than e edges have sides of 0.
 
-    Parameters
-    ----------
-    compliance : (m, m) ndarray
-        [m/N]
-    active : (m,) bool ndarray
-        Contact set.
+    - node (n, e): last node in contact.
+    - side (n, e): 1 where the contact ends towards +x, -1 towards -x, 0 where there is no edge.
+    - fraction (n, e): fraction of the cell beyond that the edge has passed.
+    - position (n, e): position of the edge [m].
     """
 
-    def __init__(self, compliance, active):
-        self.compliance = compliance
-        self.index = np.flatnonzero(active)
-        self.solve_on_set = StripCompliance(compliance).solver(active)
+    node: np.ndarray
+    side: np.ndarray
+    fraction: np.ndarray
+    position: np.ndarray
 
-    def solve(self, motions) -> np.ndarray:
-        """Return the forces (m, r) [N] of the nodes in contact that cause given displacements (m, r) [m] of them.
+    @property
+    def exists(self) -> np.ndarray:
+        """Whether there is an edge (n, e)."""
+        return self.side != 0
 
-        Each of the r columns of `motions` is solved by itself. Entries of other nodes are ignored and get no force.
-        """
-        out = np.zeros(motions.shape)
-        out[self.index] = self.solve_on_set(motions[self.index])
-        return out
+    def list_edges(self, row: int) -> list[ContactEdge]:
+        """Return the edges of one set by increasing x."""
+        fields = zip(*(field[row][self.side[row] != 0].tolist() for field in self))
+        return [ContactEdge(*field) for field in fields]
 
 
-def find_edges(
-    normal: SetFactor,
-    x,
-    force,
-    gap,
-    softness=None,
-    row_height: float | None = None,
-    *,
-    is_quadratic: bool = False,
-) -> list[ContactEdge]:
-    """Find the edges of a contact set.
+class EdgeCells(NamedTuple):
+    """Properties of the cells of an interface that displace an edge between two nodes.
+
+    - row_height: height of the first row of cells [m].
+    - is_quadratic: whether the cells are of second order.
+    - layer_fraction (m,): fraction of the compliance of a node that is due to an asperity layer, which has its edge at the
+      node itself; None without a layer.
+    """
+
+    row_height: float | None = None
+    is_quadratic: bool = False
+    layer_fraction: np.ndarray | None = None
+
+
+def find_edges(x, active, unknown, rate, cells: EdgeCells) -> ContactEdges:
+    """Find the edges of contact sets.
 
     Parameters
     ----------
-    normal : SetFactor
-        Of the normal compliance, that of a linear asperity layer included.
-    x, force, gap : (m,) ndarray
-        Positions [m], forces [N] and gap under load [m].
-    softness : (m,) ndarray, optional
-        Compliance [m/N] of the asperity layer alone, which has its edge at the node itself.
-    row_height : float, optional
-        Height of the first row of cells [m]; square cells without it.
-    is_quadratic : bool
-        Whether the cells are of second order.
+    x : (m,) ndarray
+        Positions [m].
+    active : (n, m) bool ndarray
+        Contact sets.
+    unknown, rate : (n, m) ndarray
+        Force [N] of a node in contact or gap [m] of another one, and its change per approach.
+    cells : EdgeCells
+        Cells of the interface.
 
     Returns
     -------
-    list of ContactEdge
-        By increasing x.
+    ContactEdges
     """
-    compliance = normal.compliance
-    force_rate = normal.solve(np.ones((x.size, 1)))[:, 0]
+    node, side = find_set_ends(active)
+    outside = node + side
+    inside = node - side
+    inside = np.where((inside < 0) | (inside >= x.size), outside, inside)
+    rows = np.arange(len(node))[:, None]
 
-    def _find_offset(node: int, inner: float, outer: float, fraction: float) -> float:
-        """Return the inward offset [m] of the edge that lies a fraction of a cell beyond a node.
+    # Approach since the last node entered, and to the entry of the next one; without both the edge is in the middle
+    with np.errstate(divide="ignore", invalid="ignore"):
+        since_entry = unknown[rows, node] / rate[rows, node]
+        to_next = unknown[rows, outside] / -rate[rows, outside]
+        fraction = since_entry / (since_entry + to_next)
+        is_known = (rate[rows, node] > 0) & (rate[rows, outside] < 0) & (since_entry + to_next > 0)
+        fraction = np.where(is_known, fraction, 0.5)
 
-        `inner` and `outer` are the lengths [m] of the cells before and beyond the node. An asperity layer reduces the
-        offset by its part of the compliance, because it has its edge at the node itself.
-        """
-        offset = compute_edge_offset(inner, outer, fraction, row_height, is_quadratic=is_quadratic)
-        return (
-            offset if softness is None else offset * (1 - softness[node] / compliance[node, node])
+        cell = x[outside] - x[node]
+        offset = compute_edge_offset(
+            np.abs(x[node] - x[inside]),
+            np.abs(cell),
+            fraction,
+            cells.row_height,
+            is_quadratic=cells.is_quadratic,
         )
-
-    return place_edges(x, force, gap, force_rate, 1 - compliance @ force_rate, _find_offset)
+        if cells.layer_fraction is not None:
+            offset = offset * (1 - cells.layer_fraction[node])
+    return ContactEdges(node, side, fraction, x[node] + fraction * cell - side * offset)
 
 
 def place_edges(x, force, gap, force_rate, gap_rate, compute_offset) -> list[ContactEdge]:
@@ -206,61 +217,120 @@ def place_edges(x, force, gap, force_rate, gap_rate, compute_offset) -> list[Con
     return edges
 
 
-def snap_to_steps(edges: list[ContactEdge], x, gap, step_positions) -> list[ContactEdge]:
+def snap_to_steps(edges: ContactEdges, x, gap, step_positions) -> ContactEdges:
     """Move a contact edge to a step at which the gap opens if it is less than one cell away from it.
 
     Parameters
     ----------
-    edges : list of ContactEdge
-        Edges of one contact set.
-    x, gap : (m,) ndarray
-        Positions [m] and gap of the unloaded surfaces [m].
+    edges : ContactEdges
+        Edges of n contact sets.
+    x : (m,) ndarray
+        Positions [m].
+    gap : (n, m) ndarray
+        Gap of the unloaded surfaces [m].
     step_positions : sequence
         Positions of the steps [m], each at a node.
+
+    Returns
+    -------
+    ContactEdges
     """
-    moved_edges = []
-    for edge in edges:
-        for node in (edge.node, edge.node + edge.side):
-            is_step = 0 < node < x.size - 1 and x[node] in step_positions
-            if is_step and gap[node + edge.side] > gap[node - edge.side]:
-                cell = x[edge.node + edge.side] - x[edge.node]
-                change = (x[node] - edge.position) / cell
-                edge = edge._replace(
-                    fraction=float(edge.fraction + change), position=float(x[node])
-                )
-                break
-        moved_edges.append(edge)
-    return moved_edges
+    node, side, fraction, position = edges
+    rows = np.arange(len(node))[:, None]
+    is_step = np.isin(x, step_positions)
+    is_step[[0, -1]] = False
+
+    # The last node in contact comes before the next one
+    for step_node in (node + side, node):
+        inner = np.clip(step_node, 1, x.size - 2)
+        opens = is_step[step_node] & (gap[rows, inner + side] > gap[rows, inner - side])
+        moves = opens & edges.exists
+        cell = np.where(moves, x[node + side] - x[node], 1.0)
+        moved = edges.fraction + (x[step_node] - edges.position) / cell
+        fraction = np.where(moves, moved, fraction)
+        position = np.where(moves, x[step_node], position)
+    return ContactEdges(node, side, fraction, position)
 
 
-def find_pressure_edges(x, pressure, threshold: float) -> list[ContactEdge]:
-    """Find the edges of the region in which the pressure exceeds a threshold.
+def find_pressure_edges(x, pressure, threshold) -> ContactEdges:
+    """Find the edges of the regions in which the pressure exceeds a threshold.
 
     This serves the pressures of a smooth asperity law, which have no sharp edge. Between two nodes the logarithm of the
     pressure is taken as linear.
 
     Parameters
     ----------
-    x, pressure : (m,) ndarray
-        Positions [m] and pressure [Pa] >= 0.
-    threshold : float
-        Pressure [Pa] at an edge.
+    x : (m,) ndarray
+        Positions [m].
+    pressure : (n, m) ndarray
+        Pressures [Pa] >= 0.
+    threshold : (n, 1) ndarray
+        Pressures [Pa] > 0 at an edge.
 
     Returns
     -------
-    list of ContactEdge
-        By increasing x.
+    ContactEdges
     """
-    with np.errstate(divide="ignore"):
+    node, side = find_set_ends(pressure > threshold)
+    rows = np.arange(len(node))[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
         height = np.log(np.maximum(pressure, MIN_EDGE_PRESSURE_RATIO * threshold)) - np.log(
             threshold
         )
-    edges = []
-    for node, side in _find_ends(pressure > threshold):
-        cell_fraction = height[node] / (height[node] - height[node + side])
-        position = x[node] + cell_fraction * (x[node + side] - x[node])
-        edges.append(ContactEdge(node, side, float(cell_fraction), float(position)))
-    return edges
+        fraction = height[rows, node] / (height[rows, node] - height[rows, node + side])
+    fraction = np.where(side != 0, fraction, 0.5)
+    position = x[node] + fraction * (x[node + side] - x[node])
+    return ContactEdges(node, side, fraction, position)
+
+
+class ContactIntervals(NamedTuple):
+    """Intervals in contact of n sets: their total length (n,) [m], and the outermost edges low and high (n,) [m].
+
+    The edges of a set without contact are NaN.
+    """
+
+    length: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def find_intervals(x, active, edges: ContactEdges) -> ContactIntervals:
+    """Find the intervals in contact of n sets, of which an end of the interface that is in contact is an end.
+
+    An interval of a node or two may be shorter than the offsets of its edges; its length is 0 then.
+
+    Parameters
+    ----------
+    x : (m,) ndarray
+        Positions [m].
+    active : (n, m) bool ndarray
+        Contact sets; only the first and the last node count.
+    edges : ContactEdges
+        Edges of the sets.
+
+    Returns
+    -------
+    ContactIntervals
+    """
+    marks = np.column_stack(
+        [
+            np.where(active[:, 0], x[0], np.nan),
+            np.where(edges.exists, edges.position, np.nan),
+            np.where(active[:, -1], x[-1], np.nan),
+        ]
+    )
+    # The positions of a set move to the front, so that each pair of them is an interval
+    order = np.argsort(np.isnan(marks), axis=1, kind="stable")
+    marks = np.take_along_axis(marks, order, axis=1)[:, : marks.shape[1] // 2 * 2]
+    pairs = np.clip(marks.reshape(len(marks), -1, 2), x[0], x[-1])
+    middle = pairs.mean(axis=2)
+    low = np.minimum(pairs[..., 0], middle)
+    high = np.maximum(pairs[..., 1], middle)
+    return ContactIntervals(
+        length=np.nansum(high - low, axis=1),
+        low=np.fmin.reduce(low, axis=1, initial=np.nan),
+        high=np.fmax.reduce(high, axis=1, initial=np.nan),
+    )
 
 
 def contact_intervals(x, force, edges: list[ContactEdge]) -> np.ndarray:
@@ -284,49 +354,6 @@ def contact_intervals(x, force, edges: list[ContactEdge]) -> np.ndarray:
     pairs = np.clip(np.array(positions, float).reshape(-1, 2), x[0], x[-1])
     middle = pairs.mean(axis=1)
     return np.stack([np.minimum(pairs[:, 0], middle), np.maximum(pairs[:, 1], middle)], axis=1)
-
-
-def set_stiffness(contact: SetFactor, motions, edges: list[ContactEdge]) -> np.ndarray:
-    """Return the stiffnesses of a contact whose edges may lie between nodes.
-
-    The stiffness motion . C_AA^-1 motion of the nodes A in contact is that of edges half a cell beyond the last nodes.
-    Every edge that lies elsewhere adds the change along the parabola through the sets with one node less and one more.
-
-    Parameters
-    ----------
-    contact : SetFactor
-        Contact set with its factorized compliance.
-    motions : (m, r) ndarray
-        Displacements of the nodes per unit: 1 for a translation, x for a rotation.
-    edges : list of ContactEdge
-        Edges of the set.
-
-    Returns
-    -------
-    (r,) ndarray
-        [N/m], or [N m/rad] for a rotation.
-    """
-    # The forces for three kinds of displacements are solved at once: `force` for the motions, `outer` for those by a unit
-    # force beyond each edge, and `inner` for a unit displacement of the last node before each edge
-    compliance = contact.compliance
-    outside = [edge.node + edge.side for edge in edges]
-    nodes = [edge.node for edge in edges]
-    n_motions = motions.shape[1]
-    units = np.zeros((len(compliance), len(edges)))
-    units[nodes, np.arange(len(edges))] = 1.0
-    solved = contact.solve(np.concatenate([motions, compliance[outside].T, units], axis=1))
-    force, outer, inner = np.split(solved, [n_motions, n_motions + len(edges)], axis=1)
-    stiffness = (force * motions).sum(axis=0)
-    if contact.index.size < 3:
-        return stiffness
-
-    # Change of the stiffness by the node beyond the edge, and by loss of the last node before it (Schur complements)
-    for k, edge in enumerate(edges):
-        row = compliance[outside[k]]
-        gain = (motions[outside[k]] - row @ force) ** 2 / (row[outside[k]] - row @ outer[:, k])
-        loss = force[nodes[k]] ** 2 / inner[nodes[k], k]
-        stiffness = stiffness + parabola_change(edge.fraction - 0.5, gain, loss)
-    return stiffness
 
 
 def parabola_change(edge_shift: float, gain: float, loss: float) -> float:

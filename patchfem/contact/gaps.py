@@ -17,17 +17,30 @@ class ShapeProperties(NamedTuple):
     - edge: position and height [m] of a jump of the gap.
     - wave: shortest wavelength [m], which the cells have to resolve. Without it the shape varies over the
       length of the piece.
+    - amplitude: factor of the shape, which is proportional to it; the other properties do not depend on it.
+    - unit: numbers of the table, by key, with which the amplitude is 1.
     """
 
     angle: Callable | None = None
     edge: Callable | None = None
     wave: Callable | None = None
+    amplitude: Callable | None = None
+    unit: tuple[tuple[str, float], ...] = ()
 
 
 # Properties of each gap shape as functions of its table
 SHAPE_PROPERTIES = {
-    "tilt": ShapeProperties(angle=lambda keys: keys.angle),
-    "step": ShapeProperties(edge=lambda keys: (keys.at, keys.height)),
+    "tilt": ShapeProperties(
+        angle=lambda keys: keys.angle,
+        amplitude=lambda keys: keys.angle,
+        unit=(("angle", 1.0),),
+    ),
+    "crown": ShapeProperties(amplitude=lambda keys: 1 / keys.radius, unit=(("radius", 1.0),)),
+    "step": ShapeProperties(
+        edge=lambda keys: (keys.at, keys.height),
+        amplitude=lambda keys: keys.height,
+        unit=(("height", 1.0),),
+    ),
 }
 
 

@@ -4,8 +4,9 @@ Find nodal forces f >= 0 with w = g + theta x - delta + C f >= 0 and f . w = 0. 
 prescribed, or the load sum f = N. Under a load the rotation theta is prescribed (it is part of g), free under a moment,
 sum f x = M, or held by the spring of the holder, sum f x = M + K theta.
 
-`solve` measures the gap from the rest position of a rigid piece and uses the primal-dual active-set method; where that
-cycles, conjugate gradients and the primal active-set method follow. `compute_residuals` checks every solution again and
+`solve` measures the gap from the rest position of a rigid piece and uses the primal-dual active-set method, for a patch
+on a table of contact sets (`press_cases`); where that cycles, conjugate gradients and the primal active-set method
+follow. `compute_residuals` checks every solution again and
 shares no intermediate result with the solver.
 """
 
@@ -26,6 +27,8 @@ from .active_set import (
     solve_primal,
     solve_primal_dual,
 )
+from .press_cases import HolderCases, press_on_table
+from .set_table import SetTable
 from .strip_compliance import StripCompliance, factorise
 
 # Largest relative residual of a solved contact; that of a wrong set is 1e-9 or more
@@ -140,6 +143,57 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
     )
 
 
+def _solve_as_one_case(
+    compliance: StripCompliance, problem: ContactProblem, start: np.ndarray
+) -> tuple[SetSolution | None, int]:
+    """Solve a patch that is a single strip as the only case of a table of contact sets.
+
+    Parameters
+    ----------
+    compliance : StripCompliance
+        Compliance [m/N] of the nodes.
+    problem : ContactProblem
+        Gap [m], motions and loads of the nodes.
+    start : (n,) bool ndarray
+        First contact set.
+
+    Returns
+    -------
+    solution : SetSolution or None
+        None if no set meets the contact conditions to round-off.
+    n_iterations : int
+        Number of contact sets tried.
+    """
+    n_motions = problem.target.size
+    columns = np.zeros((3, problem.gap.size))
+    columns[0] = 1.0
+    columns[1:n_motions] = problem.motions.T[1:]
+    columns[2] = problem.gap
+    own = compliance.common
+    if compliance.added is not None:
+        own = own + np.diag(compliance.added[0])
+    table = SetTable(own, columns, problem.gap.size, has_ends=False)
+
+    # A prescribed approach is contained in the gap
+    load, moment = np.append(problem.target, [np.nan, np.nan])[:2]
+    spring = problem.springs[1] if n_motions > 1 else 0.0
+    approach = np.nan if n_motions else 0.0
+    holder = HolderCases(*np.array([[load], [approach], [moment], [spring]]))
+    pressed = press_on_table(table, holder, np.ones((1, 1)), start[None])
+    if not pressed.is_solved[0]:
+        return None, table.n_sets
+
+    unknown = table.combine(pressed.slot, pressed.closing)[0]
+    active = table.active[pressed.slot[0]]
+    scale = np.abs(pressed.closing[0]) @ np.abs(columns)
+    return SetSolution(
+        force=np.where(active, unknown, 0.0),
+        opening=np.where(active, 0.0, unknown),
+        scale=scale,
+        motion=pressed.closing[0, :n_motions],
+    ), table.n_sets
+
+
 def solve(
     compliance: StripCompliance,
     problem: ContactProblem,
@@ -193,7 +247,10 @@ def solve(
     if solution is None:
         if start is None or np.count_nonzero(start) < problem.min_nodes:
             start = guess_contact_set(compliance, problem)
-        solution, n_iterations = solve_primal_dual(compliance, problem, start, max_iterations)
+        if is_patch:
+            solution, n_iterations = _solve_as_one_case(compliance, problem, start)
+        else:
+            solution, n_iterations = solve_primal_dual(compliance, problem, start, max_iterations)
         if solution is None or not compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
             solution, n_more = _solve_by_fallbacks(compliance, problem, max_iterations)
             n_iterations += n_more

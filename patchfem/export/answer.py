@@ -190,7 +190,7 @@ class Answer:
     title : str
         Heading of the page and first line on the screen.
     verdict : tuple of str
-        At most four sentences; the first one is the headline, with at most 30 words.
+        At most four sentences; the first one is the headline, with at most 30 words, of a sweep 30 for each main measure.
     quantities : dict of str to Quantity
         Measures by name.
     data : dict of str to Variable
@@ -202,7 +202,8 @@ class Answer:
         arrays become objects and lists, as in `to_plain`.
     origin : dict
         Where the answer comes from: `patchfem` (version), `scene` (text as written), `resolved` (scene with all defaults),
-        `command` (how to repeat it) and `versions` (package -> version), as far as they exist.
+        `command` (how to repeat it) and `versions` (package -> version), as far as they exist. `source`, the
+        `model.Source` of the scene, is not stored.
     """
 
     kind: str

@@ -22,7 +22,7 @@ from ..disk.atomic_write import write_text
 from ..formatting import format_length, format_number
 from ..model.model import build, write_resolved
 from ..runs.joint import find_source
-from ..scene.scene import Scene, add_sets, move_scene
+from ..scene.scene import Scene, add_sets
 from .answer import (
     Answer,
     JsonObject,
@@ -496,8 +496,6 @@ def format_fitted_scene(fit: AnyFit, scene: Scene, verdict: Sequence[str], folde
         fitted = add_sets(scene, [fit.bounds.format_assignment(fit.value)])
     else:
         fitted = fit.keys.fitted_scene()
-    # the model is built before the scene moves, because its file names are relative to its folder
     model = build(fitted)
-    moved = move_scene(fitted, folder / FITTED_SCENE_FILE)
-    text = write_resolved(moved, model, find_source(model).writer.joint)
+    text = write_resolved(fitted, model, find_source(model).writer.joint, folder)
     return "\n".join([*(f"# {sentence}" for sentence in verdict), "", text])

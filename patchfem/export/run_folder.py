@@ -137,7 +137,8 @@ def is_complete(run_plan: Plan, target: Path) -> bool:
     source = run_plan.model.source
     solved = tuple(f"{key.rpartition('.')[2]} = " for key in source.writer.joint)
     lines = [one for one in text.splitlines() if not one.startswith(solved)]
-    planned = [one for one in source.resolved.splitlines() if not one.startswith(solved)]
+    planned = source.write_resolved(target).splitlines()
+    planned = [one for one in planned if not one.startswith(solved)]
     if version == __version__ and lines == planned:
         return True
     raise PatchfemError(

@@ -75,12 +75,14 @@ def make_origin(source, verb: str) -> JsonObject:
     Returns
     -------
     dict
-        Keys `patchfem`, `scene`, `resolved`, `command` and `versions`, all without the folder of the scene.
+        Keys `patchfem`, `scene`, `resolved`, `command` and `versions`, all without the folder of the scene; and `source`,
+        from which `write_answer` writes the resolved scene for another folder.
     """
     return {
         "patchfem": __version__,
         "scene": source.text,
         "resolved": source.resolved,
+        "source": source,
         "command": make_command(verb, source.path, source.repeating_sets),
         "versions": list_versions(),
     }

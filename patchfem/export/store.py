@@ -57,8 +57,14 @@ def name_data_file(kind: str) -> str:
 def write_answer(answer: Answer, folder: Path) -> None:
     """Write all files of an answer except its page into an existing folder.
 
+    The resolved scene names files relative to this folder, so that it can be run from there.
+
     OSError or WriteError is raised if this fails.
     """
+    source = answer.origin.get("source")
+    if source is not None:
+        resolved = {"resolved": source.write_resolved(folder)}
+        answer = replace(answer, origin=answer.origin | resolved)
     if answer.origin.get("resolved"):
         write_text(folder / SCENE_FILE, answer.origin["resolved"])
     if answer.data:
@@ -100,8 +106,9 @@ def make_summary(answer: Answer) -> JsonObject:
         "warnings": list(answer.remarks.warnings),
         "notes": list(answer.remarks.notes),
     }
-    # the resolved scene has a file of its own
-    origin = {key: value for key, value in answer.origin.items() if key != "resolved"}
+    # the resolved scene has a file of its own, which is written from the source
+    own = ("resolved", "source")
+    origin = {key: value for key, value in answer.origin.items() if key not in own}
     return summary | details | {"origin": origin}
 
 

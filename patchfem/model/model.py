@@ -308,7 +308,9 @@ def _attach_bolted_model(scene: Scene, rig_model: Rig) -> Rig:
     return replace(rig_model, structure=replace(rig_model.structure, bolted=bolted))
 
 
-def write_resolved(scene: Scene, model: Model, joint: dict[str, float]) -> str:
+def write_resolved(
+    scene: Scene, model: Model, joint: dict[str, float], folder: Path | None = None
+) -> str:
     """Write the scene as TOML in SI units with all defaults, including those from the model.
 
     Parameters
@@ -319,6 +321,8 @@ def write_resolved(scene: Scene, model: Model, joint: dict[str, float]) -> str:
         Its model.
     joint : dict of str to float
         Keys and values in SI that state the joint which was subtracted from bolted modes.
+    folder : Path, optional
+        Folder to which the names of files are relative; by default that of the scene.
     """
     friction = scene.friction
     if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
@@ -327,7 +331,7 @@ def write_resolved(scene: Scene, model: Model, joint: dict[str, float]) -> str:
     for key, value in joint.items():
         name, *pieces = key.split(".")
         tables[name] = replace_number(tables[name], pieces, value)
-    return replace(scene, **tables).resolved()
+    return replace(scene, **tables).resolved(folder)
 
 
 def _refuse_sweep(scene: Scene) -> None:

@@ -14,11 +14,12 @@ from ..scene.sets import format_values
 class SceneWriter(NamedTuple):
     """Writer of the resolved scene.
 
-    - write: function of `joint` that returns the text.
+    - write: function of `joint`, and of the folder to which file names are relative (None: that of the scene), that
+      returns the text.
     - joint: keys of the scene, with their values in SI, that state the joint which was subtracted from bolted modes.
     """
 
-    write: Callable[[dict[str, float]], str]
+    write: Callable[[dict[str, float], Path | None], str]
     joint: dict[str, float]
 
 
@@ -48,7 +49,11 @@ class Source:
     @property
     def resolved(self) -> str:
         """Scene as TOML in SI units with all defaults; it is written on demand."""
-        return self.writer.write(self.writer.joint)
+        return self.write_resolved()
+
+    def write_resolved(self, folder: Path | None = None) -> str:
+        """Return the scene as `resolved`, with file names relative to another folder."""
+        return self.writer.write(self.writer.joint, folder)
 
     @property
     def repeating_sets(self) -> tuple[str, ...]:

@@ -5,8 +5,8 @@ nodes in partial slip, laws that are much faster than the drive; and, with one p
 
 1. `return_maps_kernels`  force, tangent and state of each law after a step of slide
 2. `laws`                 numbers and first memory of the laws from their keys
-3. `case_rows`, `case_observers_kernels`, `linear_cases_kernels`, `smooth_cases_kernels`, `cases`  many cases of one mode
-   and one point with their measures, for laws that are linear between events and for smooth ones
+3. `case_rows`, `case_observers_kernels`, `linear_cases_kernels`, `smooth_cases_kernels`, `case_march_kernels`, `cases`
+   many cases of one mode and one point with their measures, for laws that are linear between events and for smooth ones
 4. `contacts`             points of a rig or a bench: elements, bonds, patches, varying loads, grooves
 5. `march_rows`, `lists_kernels`, `flanks_kernels`, `march_kernels`  steps of modes with many points
 6. `checkpoint`, `time_march`  march over the cycles of a drive, with its record; its state on disk
@@ -17,7 +17,15 @@ A law is a number in `law_rows.Law` with a branch in each of five functions. Rea
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "case_rows": ("SAME_CASE_CYCLE", "SAME_SMOOTH_CYCLE", "Cases", "Number"),
+    "case_rows": (
+        "MAX_STEPS",
+        "MAX_STEP_PHASE",
+        "SAME_CASE_CYCLE",
+        "SAME_SMOOTH_CYCLE",
+        "WINDOW_STEPS",
+        "Cases",
+        "Number",
+    ),
     "cases": ("CaseMarch", "is_linear_between_events", "list_parameters", "march_cases"),
     "checkpoint": ("CheckpointFiles", "store_checkpoints"),
     "contacts": (

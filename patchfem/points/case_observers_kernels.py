@@ -1,21 +1,24 @@
 """What is observed of a case of one mode and one point, piece by piece of its motion (compiled).
 
 A piece lies between two instants, at which slide, velocity and acceleration are known. The slide between them is the
-polynomial of order 5 through them, whose integrals and extremes have errors of order 6 in the length of the piece. A piece
-ends where the velocity changes its sign, or where the acceleration jumps.
+polynomial of order 5 through them, whose integrals have errors of order 6 in the length of the piece. A piece ends where
+the velocity changes its sign, or where the acceleration jumps.
 
 `case`, `now`, `seen` and `loop` are rows of one case, see `case_rows`.
 """
 
-from math import cos, nan, sin
+from math import cos, nan, pi, sin
 from typing import NamedTuple
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
 from .case_rows import Loop, Now, Number, Seen
 
-N_ROOT_STEPS = 4  # Newton steps for an extreme of a polynomial, from that of a parabola
 N_READ = 2  # measured cycles of a motion that repeats
+STEP_ROUND_OFF = 1e-9  # remainder of a cycle relative to a step that belongs to the step
+N_PARABOLAS = 2  # further parabolas for an extreme of force or acceleration, each four times as narrow as the last
+SAME_SLIDE = 1e-12  # relative difference of slides that is round-off
+STICK_SHARE = 0.5  # irreversible part of the motion from which a point slips
 
 
 class Instant(NamedTuple):
@@ -36,22 +39,33 @@ class Instant(NamedTuple):
     slip: float
 
 
-class Polynomial(NamedTuple):
-    """Slide of a piece [m] by the powers 1 to 5 of the elapsed fraction, beyond the slide at its start."""
+class Piece(NamedTuple):
+    """Piece of a motion.
 
-    first: float
-    second: float
-    third: float
-    fourth: float
-    fifth: float
+    - first, last: its ends
+    - duration: [s]
+    - work: friction work [J]
+    - end_force: friction force [N] that counts if the slide is an extreme at the end, NaN if it is unknown
+    """
+
+    first: Instant
+    last: Instant
+    duration: float
+    work: float
+    end_force: float
 
 
-class Rise(NamedTuple):
-    """Slide beyond that at the start of a piece [m], and its first and second derivative by the fraction of the time [m]."""
+class Vertex(NamedTuple):
+    """Extreme of a parabola through three equally spaced values.
 
-    rise: float
-    rate: float
-    bend: float
+    - is_between: whether it lies between them
+    - offset: its distance from the middle, relative to the spacing
+    - largest: largest magnitude of the parabola between the outer values
+    """
+
+    is_between: bool
+    offset: float
+    largest: float
 
 
 class Weights(NamedTuple):
@@ -62,69 +76,39 @@ class Weights(NamedTuple):
 
 
 @njit(**NJIT_KERNEL)
-def interpolate(first, last, dt):
-    """Return the `Polynomial` of a piece.
-
-    Parameters
-    ----------
-    first, last : Instant
-        Ends of the piece.
-    dt : float
-        Duration [s].
-    """
-    rate = dt * first.velocity
-    bend = 0.5 * dt * dt * first.acceleration
-    slide = last.slide - first.slide - rate - bend
-    velocity = dt * last.velocity - rate - 2 * bend
-    acceleration = dt * dt * last.acceleration - 2 * bend
-    return Polynomial(
-        rate,
-        bend,
-        10 * slide - 4 * velocity + 0.5 * acceleration,
-        -15 * slide + 7 * velocity - acceleration,
-        6 * slide - 3 * velocity + 0.5 * acceleration,
-    )
+def store_instant(instant, now):
+    """Store an `Instant` in the state of a case, `now` (18,) in the order of `case_rows.Now`."""
+    now[Now.SINE] = instant.sine
+    now[Now.COSINE] = instant.cosine
+    now[Now.SLIDE] = instant.slide
+    now[Now.VELOCITY] = instant.velocity
+    now[Now.FORCE] = instant.force
+    now[Now.SLIP] = instant.slip
 
 
 @njit(**NJIT_KERNEL)
-def evaluate(first, last, dt, part):
-    """Return `Rise` within a piece.
-
-    Parameters
-    ----------
-    first, last : Instant
-        Ends of the piece.
-    dt : float
-        Duration [s].
-    part : float
-        Fraction of the duration.
-    """
-    p = interpolate(first, last, dt)
-    rest = p.third + part * (p.fourth + part * p.fifth)
-    rise = part * (p.first + part * (p.second + part * rest))
-    slope = 3 * p.third + part * (4 * p.fourth + part * 5 * p.fifth)
-    rate = p.first + part * (2 * p.second + part * slope)
-    bend = 2 * p.second + part * (6 * p.third + part * (12 * p.fourth + part * 20 * p.fifth))
-    return Rise(rise, rate, bend)
+def turn_phase(instant, turn):
+    """Return sine and cosine of the phase of the drive at an angle `turn` [rad] after an `Instant`."""
+    c = cos(turn)
+    s = sin(turn)
+    return instant.sine * c + instant.cosine * s, instant.cosine * c - instant.sine * s
 
 
 @njit(**NJIT_KERNEL)
-def find_turn(first, last, dt):
-    """Return the fraction of a piece after which its velocity changes the sign.
+def find_vertex(before, middle, after):
+    """Return the `Vertex` of a parabola.
 
     Parameters
     ----------
-    first, last : Instant
-        Ends of the piece.
-    dt : float
-        Duration [s].
+    before, middle, after : float
+        Three equally spaced values.
     """
-    part = first.velocity / (first.velocity - last.velocity)
-    for _ in range(N_ROOT_STEPS):
-        at = evaluate(first, last, dt, part)
-        if at.bend != 0:
-            part = min(max(part - at.rate / at.bend, 0.0), 1.0)
-    return part
+    largest = max(abs(before), abs(middle), abs(after))
+    bend = before - 2 * middle + after
+    tilt = after - before
+    if abs(tilt) >= 2 * abs(bend):
+        return Vertex(False, 0.0, largest)
+    return Vertex(True, -0.5 * tilt / bend, max(largest, abs(middle - tilt * tilt / (8 * bend))))
 
 
 @njit(**NJIT_KERNEL)
@@ -151,54 +135,54 @@ def weigh(instant, dt, omega):
 
 
 @njit(**NJIT_KERNEL)
-def observe_extreme(q, force, now, loop):
+def observe_extreme(q, force, is_turn, now, loop):
     """Update the extremes of the slide in the cycle.
 
     Parameters
     ----------
     q, force : float
         A slide [m], and the friction force there [N].
-    now : (15,) array
+    is_turn : bool
+        Whether the motion turns there. The force is then that of the extreme also if a slide just before was the same up
+        to round-off.
+    now : (18,) array
         State of the case, in the order of `case_rows.Now` (changed in place).
     loop : (5,) array
         The cycle, in the order of `case_rows.Loop` (changed in place).
     """
-    if q > now[Now.MAX]:
-        now[Now.MAX] = q
+    margin = SAME_SLIDE * abs(q) if is_turn else 0.0
+    if q > now[Now.MAX] - margin:
+        now[Now.MAX] = max(q, now[Now.MAX])
         loop[Loop.FORCE_AT_MAX] = force
-    if q < now[Now.MIN]:
-        now[Now.MIN] = q
+    if q < now[Now.MIN] + margin:
+        now[Now.MIN] = min(q, now[Now.MIN])
         loop[Loop.FORCE_AT_MIN] = force
 
 
 @njit(**NJIT_KERNEL)
-def add_piece(first, last, dt, work, end_force, case, now, loop):
+def add_piece(piece, case, now, loop):
     """Add a piece to energies, phasor and extremes of a case in `now`, and to the forces at the extremes in `loop`.
 
     Parameters
     ----------
-    first, last : Instant
-        Ends of the piece.
-    dt : float
-        Duration [s].
-    work : float
-        Friction work of the piece [J].
-    end_force : float
-        Friction force [N] that counts if the slide is an extreme at the end of the piece, NaN if it is unknown.
+    piece : Piece
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
-    now : (15,) array
+    now : (18,) array
         State of the case, in the order of `case_rows.Now` (changed in place).
     loop : (5,) array
         The cycle, in the order of `case_rows.Loop` (changed in place).
     """
+    first = piece.first
+    last = piece.last
+    dt = piece.duration
     # Energies of damper, friction and mode; that of the drive follows from the phasor of the cycle.
     v = first.velocity
     end = last.velocity
     squares = 0.5 * (v * v + end * end)
     squares += dt / 6 * (v * first.acceleration - end * last.acceleration)
     now[Now.VISCOUS] += case[Number.DAMPING] * dt * squares
-    now[Now.FRICTION] += case[Number.MOBILITY] * work
+    now[Now.FRICTION] += case[Number.MOBILITY] * piece.work
     energy = 0.5 * (end * end + case[Number.STIFFNESS] * last.slide * last.slide)
     now[Now.STORED] = max(now[Now.STORED], energy)
     power = abs(first.sine * v) + abs(last.sine * end)
@@ -211,11 +195,7 @@ def add_piece(first, last, dt, work, end_force, case, now, loop):
     now[Now.COS] += stop.real * last.cosine + stop.imaginary * last.sine
     now[Now.SIN] += begin.real * first.sine - begin.imaginary * first.cosine
     now[Now.SIN] += stop.real * last.sine - stop.imaginary * last.cosine
-    if v * end < 0:
-        # Measured pieces end at a turn, so that its force is not needed.
-        turn = evaluate(first, last, dt, find_turn(first, last, dt))
-        observe_extreme(first.slide + turn.rise, nan, now, loop)
-    observe_extreme(last.slide, end_force, now, loop)
+    observe_extreme(last.slide, piece.end_force, end == 0, now, loop)
 
 
 @njit(**NJIT_KERNEL)
@@ -244,81 +224,83 @@ def add_third_harmonic(instant, dt, omega, seen):
 
 
 @njit(**NJIT_KERNEL)
-def observe_piece(first, last, dt, work, case, seen):
+def observe_piece(piece, case, seen):
     """Add a piece of the window to `seen`: third harmonic, mean slide, work, and extremes of force and slip at its ends.
 
     Parameters
     ----------
-    first, last : Instant
-        Ends of the piece.
-    dt : float
-        Duration [s].
-    work : float
-        Friction work of the piece [J].
+    piece : Piece
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
     seen : (20,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
-    add_third_harmonic(first, dt, case[Number.OMEGA], seen)
-    add_third_harmonic(last, -dt, case[Number.OMEGA], seen)
+    first = piece.first
+    last = piece.last
+    add_third_harmonic(first, piece.duration, case[Number.OMEGA], seen)
+    add_third_harmonic(last, -piece.duration, case[Number.OMEGA], seen)
     seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], abs(first.force), abs(last.force))
     seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], last.slip)
     seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], last.slip)
 
     # The work check compares the exact work with the trapezoidal rule over the pieces, relative to the work that passed
     # through the point in either direction.
-    seen[Seen.WORK] += work
+    seen[Seen.WORK] += piece.work
     seen[Seen.SAMPLED] += 0.5 * (first.force + last.force) * (last.slide - first.slide)
-    seen[Seen.PASSED] += abs(work)
+    seen[Seen.PASSED] += abs(piece.work)
 
 
 @njit(**NJIT_KERNEL)
-def observe_acceleration(first, last, dt, case, seen):
-    """Update the largest acceleration of the output, that of the base included, `Seen.MAX_ACCELERATION` [m s-2].
+def find_time_above(level, shares, crossing):
+    """Return the fraction of a piece in which the irreversible part of the motion is above a level.
 
     Parameters
     ----------
-    first, last : Instant
-        Ends of the piece.
-    dt : float
-        Duration [s].
-    case : (12,) array
-        Numbers of the case, in the order of `case_rows.Number`.
+    level : float
+        The level.
+    shares : (float, float)
+        Irreversible part at both ends of the piece.
+    crossing : float
+        Fraction of the piece after which it passes the level, if it does.
+    """
+    begin, end = shares
+    if (begin > level) == (end > level):
+        return 1.0 if begin > level else 0.0
+    return crossing if begin > level else 1 - crossing
+
+
+@njit(**NJIT_KERNEL)
+def observe_stick(first, shares, crossings, turn, seen):
+    """Add the phase that passes in a piece during stick, and the phase at which slip starts, to `seen`.
+
+    A point sticks while the irreversible part of its motion lies between -STICK_SHARE and STICK_SHARE; after a turn it may
+    be negative. Slip starts where it rises above this level, in a piece or by a jump between two pieces.
+
+    Parameters
+    ----------
+    first : Instant
+        Start of the piece.
+    shares : (float, float)
+        Irreversible part of the motion at both ends of the piece.
+    crossings : (float, float)
+        Fractions of the piece after which it passes -STICK_SHARE and STICK_SHARE, if it does.
+    turn : float
+        Phase of the drive that passes [rad].
     seen : (20,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     """
-    base = case[Number.BASE]
-    output = case[Number.OUTPUT]
-    omega = case[Number.OMEGA]
-    peak = max(
-        abs(output * first.acceleration + base * first.sine),
-        abs(output * last.acceleration + base * last.sine),
-    )
+    begin, end = shares
+    stuck = find_time_above(-STICK_SHARE, shares, crossings[0])
+    stuck -= find_time_above(STICK_SHARE, shares, crossings[1])
+    seen[Seen.STUCK] += stuck * turn
 
-    # Between the ends the acceleration has an extreme where its rate per fraction of the piece changes the sign.
-    p = interpolate(first, last, dt)
-    scale = output / (dt * dt)
-    turn = omega * dt
-    begin = 6 * scale * p.third + base * turn * first.cosine
-    end = scale * (6 * p.third + 24 * p.fourth + 60 * p.fifth) + base * turn * last.cosine
-    if begin * end < 0:
-        part = begin / (begin - end)
-        for _ in range(N_ROOT_STEPS):
-            c = cos(part * turn)
-            s = sin(part * turn)
-            sine = first.sine * c + first.cosine * s
-            cosine = first.cosine * c - first.sine * s
-            value = 2 * p.second + part * (
-                6 * p.third + part * (12 * p.fourth + part * 20 * p.fifth)
-            )
-            peak = max(peak, abs(scale * value + base * sine))
-            rate = scale * (6 * p.third + part * (24 * p.fourth + part * 60 * p.fifth))
-            rate += base * turn * cosine
-            slope = scale * (24 * p.fourth + part * 120 * p.fifth) - base * turn * turn * sine
-            if slope != 0:
-                part = min(max(part - rate / slope, 0.0), 1.0)
-    seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
+    jumps = seen[Seen.SHARE] <= STICK_SHARE < begin
+    if jumps or begin <= STICK_SHARE < end:
+        sine, cosine = turn_phase(first, 0.0 if jumps else crossings[1] * turn)
+        seen[Seen.STARTS] += 1
+        seen[Seen.SLIP_START_PHASE_COS] += cosine * cosine - sine * sine
+        seen[Seen.SLIP_START_PHASE_SIN] += 2 * sine * cosine
+    seen[Seen.SHARE] = end
 
 
 @njit(**NJIT_KERNEL)
@@ -327,13 +309,15 @@ def start_cycle(now, seen, loop):
 
     Parameters
     ----------
-    now : (15,) array
+    now : (18,) array
         State of the case, in the order of `case_rows.Now` (changed in place).
     seen : (20,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
     loop : (5,) array
         The cycle, in the order of `case_rows.Loop` (changed in place).
     """
+    now[Now.SINE] = 0.0
+    now[Now.COSINE] = 1.0
     now[Now.MIN] = now[Now.MAX] = now[Now.SLIDE]
     now[Now.COS] = now[Now.SIN] = 0.0
     loop[Loop.FORCE_AT_MIN] = loop[Loop.FORCE_AT_MAX] = nan
@@ -347,6 +331,7 @@ def start_window(now, seen):
     seen[Seen.MIN_SLIP] = seen[Seen.MAX_SLIP] = now[Now.SLIP]
     seen[Seen.START_SLIDE] = now[Now.SLIDE]
     seen[Seen.START_VELOCITY] = now[Now.VELOCITY]
+    seen[Seen.SHARE] = 1.0  # A slip that begins with the window has no start in it.
 
 
 @njit(**NJIT_KERNEL)
@@ -357,7 +342,7 @@ def end_cycle(case, now, seen, loop, history):
     ----------
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
-    now : (15,) array
+    now : (18,) array
         State of the case, in the order of `case_rows.Now` (changed in place).
     seen : (20,) array
         What was observed, in the order of `case_rows.Seen` (changed in place).
@@ -370,7 +355,7 @@ def end_cycle(case, now, seen, loop, history):
     now[Now.WORK_IN] -= case[Number.DRIVE] * case[Number.OMEGA] * now[Now.COS]
     seen[Seen.COS_1] += now[Now.COS]
     seen[Seen.SIN_1] += now[Now.SIN]
-    seen[Seen.SPAN] += 6.283185307179586 / case[Number.OMEGA]
+    seen[Seen.SPAN] += 2 * pi / case[Number.OMEGA]
     loop[Loop.SLIDE] = seen[Seen.SLIDE]
     history[0] = loop[Loop.MIN_SLIDE] = now[Now.MIN]
     history[1] = loop[Loop.MAX_SLIDE] = now[Now.MAX]
@@ -380,44 +365,3 @@ def end_cycle(case, now, seen, loop, history):
         loop[Loop.FORCE_AT_MAX] = nan  # the slide still grows: no reversal
     if now[Now.SLIDE] == now[Now.MIN] and now[Now.VELOCITY] < 0:
         loop[Loop.FORCE_AT_MIN] = nan
-
-
-@njit(**NJIT_KERNEL)
-def repeat_cycle(cycle, same, begin, sums, case, now, history):
-    """Return the number of cycles after one that ends as it began which repeat it, without being computed.
-
-    The last N_READ cycles are computed, because the measures are taken over them.
-
-    Parameters
-    ----------
-    cycle : int
-        Number of cycles that are computed.
-    same : float
-        Change of the cycle relative to the range of the motion, below which it repeats.
-    begin : tuple of float
-        Slide [m], velocity [m/s] and force [N] at the start of the last cycle.
-    sums : tuple of float
-        The rows WORK_IN, POWER, VISCOUS and FRICTION of `now` there.
-    case : (12,) array
-        Numbers of the case, in the order of `case_rows.Number`.
-    now : (15,) array
-        State of the case, in the order of `case_rows.Now` (changed in place).
-    history : (n, 4) array
-        Extremes and phasor of every cycle (changed in place).
-    """
-    size = same * (now[Now.MAX] - now[Now.MIN])
-    force = abs(case[Number.DRIVE]) / case[Number.MOBILITY]
-    n_repeated = int(case[Number.CYCLES]) - N_READ - cycle
-    if (
-        n_repeated <= 0
-        or abs(now[Now.SLIDE] - begin[0]) > size
-        or abs(now[Now.VELOCITY] - begin[1]) > case[Number.OMEGA] * size
-        or abs(now[Now.FORCE] - begin[2]) > same * force
-    ):
-        return 0
-    for k in range(cycle, cycle + n_repeated):
-        for column in range(4):
-            history[k, column] = history[cycle - 1, column]
-    for k in range(4):
-        now[Now.WORK_IN + k] += n_repeated * (now[Now.WORK_IN + k] - sums[k])
-    return n_repeated

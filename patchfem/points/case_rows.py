@@ -7,8 +7,12 @@ import numpy as np
 
 # Change between two cycles relative to the range of the motion, below which it repeats, of exact steps
 SAME_CASE_CYCLE = 1e-10
-# The same of smooth laws with one step per cycle: it decreases with the steps as their error, to 2e-9 with 48 steps
-SAME_SMOOTH_CYCLE = 2e-4
+# The same of n steps per cycle of a smooth law, times n^3: it decreases nearly as fast as the error of the steps, which is
+# of order 4 and a thousand times as large (2e-5 with 40 steps, 3e-9 here)
+SAME_SMOOTH_CYCLE = 2e-2
+MAX_STEP_PHASE = 1.0  # largest phase of the vibration of a sticking point in an exact step [rad]
+MAX_STEPS = 256  # largest number of exact steps per cycle
+WINDOW_STEPS = 4.0  # exact steps of a measured cycle per step of another one
 
 
 class Number(IntEnum):
@@ -45,14 +49,16 @@ class Number(IntEnum):
 
 
 class Now(IntEnum):
-    """Columns of the state (c, 15) of c cases.
+    """Columns of the state (c, 18) of c cases.
 
     Kernels get the row of one case.
 
-    - SLIDE, VELOCITY: at the end of the last step [m], [m/s]
+    - SLIDE, VELOCITY: at the end of the last piece [m], [m/s]
     - FORCE: friction force [N] there
     - SLIP: irreversible slide [m]
     - DIRECTION: direction of slip of a point that is linear between events, 0 during stick
+    - SINE, COSINE: of the phase of the drive
+    - TANGENT: change of the force of a smooth law per slide in the last step [N/m]
     - MIN, MAX: smallest and largest slide in the cycle [m]
     - COS, SIN: integrals of the slide times cos(OMEGA t) and sin(OMEGA t) over the cycle [m s]
     - WORK_IN: work of the drive per mass since the start [J/kg]
@@ -68,16 +74,19 @@ class Now(IntEnum):
     FORCE = 2
     SLIP = 3
     DIRECTION = 4
-    MIN = 5
-    MAX = 6
-    COS = 7
-    SIN = 8
-    WORK_IN = 9
-    POWER = 10
-    VISCOUS = 11
-    FRICTION = 12
-    STORED = 13
-    ELASTIC = 14
+    SINE = 5
+    COSINE = 6
+    TANGENT = 7
+    MIN = 8
+    MAX = 9
+    COS = 10
+    SIN = 11
+    WORK_IN = 12
+    POWER = 13
+    VISCOUS = 14
+    FRICTION = 15
+    STORED = 16
+    ELASTIC = 17
 
 
 class Seen(IntEnum):
@@ -91,12 +100,12 @@ class Seen(IntEnum):
     - STUCK: phase of the drive that passes during stick [rad]
     - STARTS: number of starts of slip
     - SLIP_START_PHASE_COS, SLIP_START_PHASE_SIN: sums of cosine and sine of twice the phases of the drive at these starts
-    - SHARE: irreversible part of the motion at the end of the last step
+    - SHARE: irreversible part of the motion at the end of the last piece
     - COS_1, SIN_1: integrals of the slide times cos(OMEGA t) and sin(OMEGA t) [m s]
     - COS_3, SIN_3: the same with 3 OMEGA
-    - WORK: friction work by the mean forces of the steps [J]
+    - WORK: friction work by the mean forces of the pieces [J]
     - SAMPLED: friction work by the trapezoidal rule [J]
-    - PASSED: sum over the steps of the magnitude of the friction work [J]
+    - PASSED: sum over the pieces of the magnitude of the friction work [J]
     - START_SLIDE, START_VELOCITY: at the start of the window [m], [m/s]
     - SPAN: duration [s]
     - SLIDE: integral of the slide over the present cycle [m s]

@@ -73,27 +73,21 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     Parameters
     ----------
     cases : Cases
-        With the same number of cycles.
+        With the same law and number of cycles.
     steps : int
-        Whole steps per cycle; steps with an event are halved.
+        Fewest steps per cycle.
     """
     n = len(cases.parameters)
     columns = cases.parameters.T
-    now = np.zeros((n, len(Now)))
+    # The second row of a case is for the cycle before, the first cycle for those before the window.
+    states = np.zeros((n, 2, len(Now)))
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
-    # The first row is for the cycles before the window.
     loops = np.full((n, 1 + int(columns[Number.WINDOW].max(initial=0)), len(Loop)), np.nan)
-    outputs = now, seen, history, loops
-    if is_linear_between_events(cases):
-        linear = compiled.load_compiled_module("points.linear_cases_kernels")
-        angles = 2 * np.pi / linear.MAX_STEPS * np.arange(linear.MAX_STEPS + 1)
-        waves = np.column_stack([np.sin(angles), np.cos(angles)])
-        linear.march_cases(steps, waves, cases.parameters, cases.numbers, *outputs)
-    else:
-        smooth = compiled.load_compiled_module("points.smooth_cases_kernels")
-        memory = cases.memory.copy()
-        smooth.march_cases(steps, cases.parameters, cases.numbers, memory, *outputs)
+    kernels = compiled.load_compiled_module("points.case_march_kernels")
+    law = cases.numbers, cases.memory.copy()
+    kernels.march_cases(steps, cases.parameters, law, states, seen, history, loops)
+    now = states[:, 0]
 
     output = columns[Number.OUTPUT][:, None]
     phasors = (history[..., 2] - 1j * history[..., 3]) * columns[Number.OMEGA][:, None] / np.pi
@@ -113,7 +107,7 @@ def find_mean_stretches(cases: Cases, now, seen, loops) -> np.ndarray:
     ----------
     cases : Cases
         The c cases that were run.
-    now : (c, 15) array
+    now : (c, 18) array
         States at the end, in the order of `case_rows.Now`.
     seen : (c, 20) array
         What was observed, in the order of `case_rows.Seen`.
@@ -139,7 +133,7 @@ def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.nd
     ----------
     cases : Cases
         The cases that were run.
-    now : (c, 15) array
+    now : (c, 18) array
         States at the end, in the order of `case_rows.Now`.
     seen : (c, 20) array
         What was observed, in the order of `case_rows.Seen`.
@@ -187,7 +181,7 @@ def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.nd
 def _compute_energies(cases: Cases, now) -> dict[str, np.ndarray]:
     """Return the energies (c,) [J] of the whole run by name, for the balance of `motion_measures`.
 
-    `now` (c, 15) are the states of the cases at the end, in the order of `case_rows.Now`. Energies in `now` and in the
+    `now` (c, 18) are the states of the cases at the end, in the order of `case_rows.Now`. Energies in `now` and in the
     parameters are per unit of the moving mass.
     """
     columns = cases.parameters.T
@@ -230,7 +224,7 @@ def find_harmonics(cases: Cases, now, seen) -> Harmonics:
     ----------
     cases : Cases
         The c cases that were run.
-    now : (c, 15) array
+    now : (c, 18) array
         States at the end, in the order of `case_rows.Now`.
     seen : (c, 20) array
         What was observed, in the order of `case_rows.Seen`.

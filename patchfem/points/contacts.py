@@ -90,11 +90,18 @@ class Contact:
     elements: object = None
 
     @property
+    def engine(self):
+        """Module that makes the arrays and loads the kernels of this contact; None for `time_march`."""
+        return None
+
+    def is_rigid(self, point_set: PointSet) -> bool:
+        """Return whether a set of points sticks without displacement."""
+        return bool((point_set.law.numbers[0] == Law.COULOMB).all())
+
+    @property
     def set_valued(self) -> bool:
         """Whether the first interface sticks rigidly."""
-        return bool(self.point_sets) and bool(
-            (self.point_sets[0].law.numbers[0] == Law.COULOMB).all()
-        )
+        return bool(self.point_sets) and self.is_rigid(self.point_sets[0])
 
     @property
     def reduction(self):

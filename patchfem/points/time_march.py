@@ -150,6 +150,8 @@ class Motion:
 
 def load_kernels(contact: Contact, say=None):
     """Return the compiled march with the parts that a contact needs: lists of bonds, contact sets."""
+    if contact.engine is not None:
+        return contact.engine.load_kernels(contact, say)
     parts = {}
     if contact.bond_sum is None:
         parts["lists"] = "points.no_lists_kernels"
@@ -251,6 +253,8 @@ def make_system(
     start : core.InitialState, optional
         Modal coordinates and velocities; at rest by default.
     """
+    if contact.engine is not None:
+        return contact.engine.make_system(contact, step, modes, travel, start)
     # Rows of the ports; heave and pitch of a normal contact are two more, with their numbers in the first entries of `press`
     # (`Ports.contact`), which are -1 without them.
     n = 0 if modes is None else modes.omega.size
@@ -324,8 +328,8 @@ def make_system(
         int(laws == {Law.BONDS} and (points.numbers[3] < 0).all()),
     )
 
-    sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
-    flank = _make_flank(contact)
+    sets = make_no_sets() if contact.sets is None else contact.sets.make_arrays()
+    flank = make_flank(contact)
     totals = np.zeros(len(Total))
     system = System(structure, ports, points, lists, flank, sets, state, totals, options)
     # Springs and slips refer to the displacement at rest; rigid points slip from the start where their ports move.
@@ -337,7 +341,7 @@ def make_system(
     velocity = np.sign(rows @ state[0, n:])[points.port] * (points.numbers[0] == Law.COULOMB)
     first[velocity != 0] = velocity[velocity != 0]
     if contact.sets is not None:
-        _press_first(system, contact)
+        press_first(system, contact)
     if contact.grooves is not None and modes is not None:
         _climb_first(system, contact)
     points.trial[:] = points.memory
@@ -471,7 +475,7 @@ def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLi
     )
 
 
-def _make_flank(contact: Contact) -> np.ndarray:
+def make_flank(contact: Contact) -> np.ndarray:
     """Return the numbers of the flank of the first port, (0,) without grooves."""
     grooves = contact.grooves
     if grooves is None:
@@ -487,7 +491,7 @@ def _make_flank(contact: Contact) -> np.ndarray:
     return flank
 
 
-def _make_no_sets():
+def make_no_sets():
     """Return arrays of contact sets with a single point, for a march in which no pressure changes and none is used."""
     point = np.zeros(1)
     return make_set_arrays(
@@ -495,7 +499,7 @@ def _make_no_sets():
     )
 
 
-def _press_first(system: System, contact: Contact) -> None:
+def press_first(system: System, contact: Contact) -> None:
     """Find the contact set of a patch at the start, and write its index to the counters of `system.sets`."""
     press = compiled.load_compiled_module("contact.press_kernels")
     name = hash_set(system.sets, contact.sets.in_contact)
@@ -509,6 +513,16 @@ def _press_first(system: System, contact: Contact) -> None:
 
 def _climb_first(system: System, contact: Contact) -> None:
     """Give the lifted mass the vertical velocity of the flank, and the points the normal force there."""
+    ratio = find_first_climb(system, contact)
+    loads = [Point.START_LOAD, Point.LOAD, Point.END_LOAD]
+    system.points.values[loads] *= ratio
+    is_bonds = system.points.numbers[0] == Law.BONDS
+    system.points.memory[1] *= ratio
+    system.points.memory[2:4, is_bonds] *= ratio
+
+
+def find_first_climb(system: System, contact: Contact) -> float:
+    """Set normal force and vertical velocity of the flank at the start; return the ratio of the force to that at rest."""
     n = system.state.shape[1] // 2
     row = system.ports.rows[0]
     q = float(row @ system.state[0, :n])
@@ -516,13 +530,9 @@ def _climb_first(system: System, contact: Contact) -> None:
     flank = system.flank
     normal = flank[Flank.LOAD] * np.hypot(1.0, slope)
     ratio = normal / flank[Flank.NORMAL]
-    loads = [Point.START_LOAD, Point.LOAD, Point.END_LOAD]
-    system.points.values[loads] *= ratio
-    is_bonds = system.points.numbers[0] == Law.BONDS
-    system.points.memory[1] *= ratio
-    system.points.memory[2:4, is_bonds] *= ratio
     flank[Flank.NORMAL] = normal
     flank[Flank.RISE_SPEED] = slope * float(row @ system.state[0, n:])
+    return ratio
 
 
 def copy_system(system):
@@ -712,8 +722,7 @@ class March:
             if point_set.is_spring:
                 continue
             columns = samples[:, n + Sample.PORTS + N_PORT_COLUMNS * k :]
-            is_rigid = (point_set.law.numbers[0] == Law.COULOMB).all()
-            mean = columns[:-1, 2] if is_rigid else None
+            mean = columns[:-1, 2] if self.contact.is_rigid(point_set) else None
             slide = samples[:, : n // 2] @ np.asarray(point_set.row, float)
             sampled += sampled_work(slide, columns[:, 0], mean)
         return sampled
@@ -725,9 +734,9 @@ class March:
         remainder = sample[2 * n :]
         time = (self.done + self.shift) * self.step
         motion = (time, float(row @ sample[:n]), *remainder[Sample.PORTS : Sample.PORTS + 2])
-        return make_snapshot(
-            self.kernels, self.system, (*motion, remainder[Sample.HEAVE], remainder[Sample.PITCH])
-        )
+        motion = (*motion, remainder[Sample.HEAVE], remainder[Sample.PITCH])
+        make = make_snapshot if self.contact.engine is None else self.contact.engine.make_snapshot
+        return make(self.kernels, self.system, motion)
 
     def find_ledger(self, sample, energies) -> dict[str, float]:
         """Return energies [J] and counters by name at a sample of the present state, with the sums `Energy` up to it."""

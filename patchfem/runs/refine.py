@@ -134,8 +134,7 @@ def refine(
     judge : callable
         Function of a solution and of the excesses of all solutions before.
     limit : RunLimit
-        No pass follows that would need more memory, or after which the run would need more CPU time to meet the
-        tolerance.
+        No pass follows that would need more memory, or at whose end the run would have taken more CPU time.
     say : callable, optional
         Callback for the reason of another pass.
     """
@@ -150,14 +149,15 @@ def refine(
         excesses.append(verdict.excess)
         resolution = verdict.finer
 
-        # The memory of the next pass, and the time that the run would need in all, are compared with their limits.
+        # Memory and time of the next pass alone are compared with their limits, because a pass often reduces the error by
+        # more than expected. The time that is reported as needed is that of all passes.
         if resolution is not None:
             if verdict.bytes > limit.bytes:
                 shortage = Shortage(verdict.axis, verdict.bytes, "accuracy.max_memory")
                 return Refined(solution, shortage)
-            expected = limit.clock() - limit.begin + verdict.predict_seconds()
-            if expected > limit.seconds:
-                return Refined(solution, Shortage(verdict.axis, expected))
+            spent = limit.clock() - limit.begin
+            if spent + verdict.cost_ratio * verdict.seconds > limit.seconds:
+                return Refined(solution, Shortage(verdict.axis, spent + verdict.predict_seconds()))
             if say is not None and verdict.reason:
                 say(verdict.reason)
     return Refined(solution)

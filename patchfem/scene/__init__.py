@@ -81,7 +81,6 @@ PUBLIC = {
         "Scene",
         "load",
         "loads",
-        "move_scene",
         "read_sweep_axes",
     ),
     "schema": ("make_schema",),

@@ -254,7 +254,7 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
         raise ValueError(f"{texts[twice]} is given twice")
     if all(isinstance(value, float) for value in values):
         unit = quantities.find_si_unit(reader.known.kind)
-        return Axis(key, texts, tuple(values), unit)
+        return Axis(key, texts, array("d", values), unit)
     return Axis(key, texts, texts, "")
 
 

@@ -1,12 +1,12 @@
 """The files that a scene names."""
 
-import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from .keys.choices import find_choices, iterate_tables
 from .keys.tables import Tables
-from .keys.types import list_keys
+from .keys.types import Table, list_keys
 from .rules.scene_draft import SceneDraft
 
 # File name extensions of universal files, by which every reader knows them
@@ -67,9 +67,15 @@ def require_files(scene: Any) -> Any:
     return scene
 
 
-def make_relative_file_sets(scene: Any, folder: Path) -> list[str]:
-    """Return assignments that make the file paths of a scene relative to another folder."""
-    return [
-        f"{key}={Path(os.path.relpath(scene.resolve_path(file), folder)).as_posix()}"
-        for key, file in list_named_files(scene)
-    ]
+def rename_files(table: Table, rename: Callable[[str], str]) -> Table:
+    """Return a copy of a table in which the names of files, also those in the tables inside it, are changed by `rename`."""
+    changes = {}
+    for key in list_keys(type(table)).values():
+        value = getattr(table, key.attribute)
+        if isinstance(value, Table):
+            changes[key.attribute] = rename_files(value, rename)
+        elif isinstance(value, tuple) and key.inner is not None:
+            changes[key.attribute] = tuple(rename_files(item, rename) for item in value)
+        elif isinstance(value, str) and key.names_file:
+            changes[key.attribute] = rename(value)
+    return table.model_copy(update=changes)

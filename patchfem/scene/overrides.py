@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from .keys.types import KeyValue, Table
 from .lines import find_scene_value
 from .reader import apply_set
 from .rules.contact import find_max_load
+from .rules.outlines import find_flat_length
 from .rules.scene_draft import SceneDraft
 from .rules.structure import MAX_USUAL_DAMPING
 from .rules.together import holds
@@ -27,38 +29,40 @@ from .scene import Scene, attach_written, finish_scene
 # Largest number of tables that a BaseScene caches, so that the cases of
 # a sweep do not read them again.
 MAX_CACHED_TABLES = 4096
-# Largest values in SI of keys of a rig with sinusoidal base motion, or of a pressed patch; no rule
-# or remark depends on a value between 0 and this limit.
+# Keys of a rig with sinusoidal base motion, or of a pressed patch, each with two values in SI between which no rule or
+# remark depends on its value.
 PLAIN_KEYS = {
-    "normal.load": inf,
-    "contact.load": inf,
-    "contact.tilt.angle": MAX_ANGLE_BETWEEN_PIECES,
-    "contact.crown.radius": inf,
-    "friction.static": inf,
-    "friction.bond_length": inf,
-    "friction.reference_speed": inf,
-    "friction.stiffness": inf,
-    "friction.stribeck_speed": inf,
-    "drive.acceleration": inf,
-    "drive.frequency": inf,
-    "structure.moving_mass": inf,
-    "structure.mode.frequency": inf,
-    "structure.mode.damping": MAX_USUAL_DAMPING,
+    "normal.load": (0, inf),
+    "contact.load": (0, inf),
+    "contact.approach.distance": (0, inf),
+    "contact.tilt.angle": (-MAX_ANGLE_BETWEEN_PIECES, MAX_ANGLE_BETWEEN_PIECES),
+    "contact.crown.radius": (0, inf),
+    "contact.step.height": (-inf, inf),
+    "contact.holder.rotational_stiffness": (0, inf),
+    "friction.static": (0, inf),
+    "friction.bond_length": (0, inf),
+    "friction.reference_speed": (0, inf),
+    "friction.stiffness": (0, inf),
+    "friction.stribeck_speed": (0, inf),
+    "drive.acceleration": (0, inf),
+    "drive.frequency": (0, inf),
+    "structure.moving_mass": (0, inf),
+    "structure.mode.frequency": (0, inf),
+    "structure.mode.damping": (0, MAX_USUAL_DAMPING),
 }
 
 
-# Scenes in which PLAIN_KEYS holds, as conditions of `rules.together`: a loaded patch, alone or in a rig, or a rig with one
+# Scenes in which PLAIN_KEYS holds, as conditions of `rules.together`: a pressed patch, alone or in a rig, or a rig with one
 # contact point. The rig has modes and a sinusoidal base motion.
-_LOADED_PATCH = (
-    "!wear & contact.load & !contact.load_line & !contact.area & !contact.grooves & !contact.holder"
-)
+_PRESSED_PATCH = "!wear & contact & !contact.load_line.moment & !contact.area & !contact.grooves"
+_HELD_PATCH = "contact.load & !contact.load_line & !contact.holder"
 _MOVED_BASE = (
     "kind=rig & !wear & structure.mode & !structure.interface & !structure.measured=stuck & drive.kind=base & "
     "!drive.duration & !friction.temperature & !friction.spread"
 )
 PLAIN_SCENES = (
-    f"kind=patch & {_LOADED_PATCH}",
-    f"{_MOVED_BASE} & {_LOADED_PATCH} & !structure.bonded",
+    f"kind=patch & {_PRESSED_PATCH}",
+    f"{_MOVED_BASE} & {_PRESSED_PATCH} & {_HELD_PATCH} & !structure.bonded",
     f"{_MOVED_BASE} & normal & !normal.grooves",
 )
 
@@ -87,12 +91,7 @@ class BaseScene:
         """
         sets = tuple(sets)
         base = self.scene
-        draft = SceneDraft(str(base.path), base.text, dict(self._draft.raw))
-        draft.sets = set(self._draft.sets)
-        for name in {key.partition(".")[0].strip() for key in sets} & draft.raw.keys():
-            draft.raw[name] = deepcopy(draft.raw[name])
-        for assignment in sets:
-            apply_set(draft, assignment)
+        draft = self._make_draft(sets)
         for name, values in draft.raw.items():
             if (name, repr(values)) in self._tables:
                 draft.read_before[id(values)] = self._tables[name, repr(values)]
@@ -104,30 +103,58 @@ class BaseScene:
                 self._tables.setdefault((name, repr(values)), getattr(draft.tables, name))
         return scene
 
-    def plain_numbers(self, scene: Scene, keys: Sequence[str]) -> PlainNumbers | None:
+    def _make_draft(self, sets: Iterable[str]) -> SceneDraft:
+        """Return a draft of the plain values of the scene with further assignments, `sets`."""
+        draft = SceneDraft(str(self.scene.path), self.scene.text, dict(self._draft.raw))
+        draft.sets = set(self._draft.sets)
+        for name in {key.partition(".")[0].strip() for key in sets} & draft.raw.keys():
+            draft.raw[name] = deepcopy(draft.raw[name])
+        for assignment in sets:
+            apply_set(draft, assignment)
+        return draft
+
+    def find_plain_numbers(self, scene: Scene, keys: Sequence[str]) -> PlainNumbers:
         """Return a fast generator of scenes that differ only in numeric values that affect no check.
 
         Parameters
         ----------
         scene : Scene
-            What `override` returned for these keys.
+            What `override` returned for values of these keys.
         keys : sequence of str
-            Dotted keys whose numbers differ.
+            Dotted keys.
 
         Returns
         -------
-        PlainNumbers or None
-            None if a key is not plain, or if a rule of such a scene depends on its value.
+        PlainNumbers
+            It changes those of the keys that are plain: no rule of such a scene depends on their values, as long as they and
+            those of `scene` are within limits.
         """
-        has_own_kinetic = "friction.static" in keys and "kinetic" in self._draft.raw.get(
-            "friction", {}
-        )
-        if has_own_kinetic or not _is_plain(self._draft, scene):
-            return None
-        limits = dict(_find_plain_key(scene, key) for key in keys)
-        # Two keys may name the same number, one of them by the name of its mode.
-        is_plain = None not in limits and len(limits) == len(keys)
-        return PlainNumbers(scene, limits) if is_plain else None
+        draft = self._make_draft(scene.sets[len(self.scene.sets) :])
+        limits: dict[str, PlainKey] = {}
+        for key in keys if _is_plain(draft, scene) else ():
+            place, value = find_scene_value(scene, key)
+            interval = PLAIN_KEYS.get(re.sub(r"\.\d+", "", place))
+            if key == "contact.load":
+                interval = (0, find_max_load(TableView(scene.contact)))
+            elif key == "contact.load_line.offset":
+                half_length = find_flat_length(TableView(scene.contact)) / 2
+                interval = (-half_length, half_length)
+            has_own_kinetic = key == "friction.static" and "kinetic" in draft.raw["friction"]
+            if interval is None or has_own_kinetic or value is None:
+                continue
+            # Two keys may name the same number, one of them by the name of its mode.
+            low, high = interval
+            if low < value < high and place not in limits:
+                limits[place] = PlainKey(key, low, high)
+        return PlainNumbers(scene, limits)
+
+
+class PlainKey(NamedTuple):
+    """Key of a number, and the values [SI] between which no check depends on it."""
+
+    key: str
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,22 +162,27 @@ class PlainNumbers:
     """Generator of scenes that differ only in numeric values that affect no check.
 
     - scene: one of these scenes.
-    - limits: upper limit [SI] of each number that differs, by its dotted key, in which modes have numbers. No check depends
-      on a value above 0 and below its limit.
+    - limits: PlainKey of each number that differs, by its dotted key, in which modes have numbers.
     """
 
     scene: Scene
-    limits: dict[str, float]
+    limits: dict[str, PlainKey]
 
-    def are_plain(self, values: np.ndarray) -> bool:
-        """Return whether given values of the keys affect no check."""
-        return bool(np.all((values > 0) & (values < list(self.limits.values()))))
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the numbers as they were given."""
+        return tuple(limit.key for limit in self.limits.values())
+
+    def are_plain(self, values: np.ndarray) -> np.ndarray:
+        """Return whether the values (n, k) of the k keys in each case (n,) affect no check."""
+        limits = np.array([limit[1:] for limit in self.limits.values()])
+        return np.all((values > limits[:, 0]) & (values < limits[:, 1]), axis=1)
 
     def make_scene(self, values: Sequence, sets: Sequence[str]) -> Scene:
         """Create a scene with given values.
 
         It is neither parsed nor checked. `values` [SI] are those of the keys. `are_plain` must hold for them. `sets` are
-        the same values as ``key=value`` strings.
+        all values of the case as ``key=value`` strings.
         """
         numbers = dict(zip(self.limits, values))
         if "friction.static" in numbers and self.scene.friction.kinetic is not None:
@@ -160,7 +192,7 @@ class PlainNumbers:
             name, *pieces = key.split(".")
             table = tables.get(name) or getattr(self.scene, name)
             tables[name] = replace_number(table, pieces, value)
-        other_sets = self.scene.sets[: len(self.scene.sets) - len(self.limits)]
+        other_sets = self.scene.sets[: len(self.scene.sets) - len(sets)]
         return replace(self.scene, sets=(*other_sets, *sets), **tables)
 
     def changed_tables(self) -> set[str]:
@@ -198,19 +230,8 @@ def _is_plain(draft: SceneDraft, scene: Scene) -> bool:
     they were written.
     """
     names = [key for key, _ in list_named_files(scene)]
-    if names not in ([], ["measured.file"]) or (names and scene.normal):
+    is_pressed = scene.kind == "patch" and all(key.startswith("contact.") for key in names)
+    if not is_pressed and (names not in ([], ["measured.file"]) or (names and scene.normal)):
         return False
     is_moved_by_sine = scene.kind == "patch" or find_waveform(scene.drive).is_sine
     return is_moved_by_sine and any(holds(draft, scene.kind, row) for row in PLAIN_SCENES)
-
-
-def _find_plain_key(scene: Scene, key: str) -> tuple[str | None, float]:
-    """Return the dotted key in PLAIN_KEYS that `key` stands for, with modes by number, and the limit of its value in SI.
-
-    The key is None if it is not in PLAIN_KEYS, or if its value is not between 0 and the limit.
-    """
-    place, value = find_scene_value(scene, key)
-    limit = PLAIN_KEYS.get(re.sub(r"\.\d+", "", place), 0.0)
-    if key == "contact.load":
-        limit = find_max_load(TableView(scene.contact))
-    return (place if value is not None and 0 < value < limit else None), limit

@@ -6,6 +6,7 @@ a float in metres, and a missing table is None. Otherwise they raise a `SceneErr
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from textwrap import shorten
 
 from . import assignments
 from .defaults import complete_tables
-from .files import list_absent_files, make_relative_file_sets, require_files
+from .files import list_absent_files, rename_files, require_files
 from .keys import tables
 from .keys.values import TomlValue
 from .lines import find_scene_value, locate_key, split_assignment
@@ -33,7 +34,6 @@ __all__ = [
     "attach_written",
     "load",
     "loads",
-    "move_scene",
     "read_sweep_axes",
 ]
 
@@ -95,9 +95,22 @@ class Scene:
         names = tables.Tables.model_fields
         return tables.Tables.model_construct(**{name: getattr(self, name) for name in names})
 
-    def resolved(self) -> str:
-        """Return the scene as TOML in SI with all defaults; loading it gives the same values."""
-        return format_toml(self.tables())
+    def resolved(self, folder: Path | None = None) -> str:
+        """Return the scene as TOML in SI with all defaults; loading it gives the same values.
+
+        The names of files are relative to `folder`, or to the folder of the scene without it.
+        """
+        if folder is None:
+            return format_toml(self.tables())
+        start = os.path.realpath(folder)
+
+        def rename(name: str) -> str:
+            """Return the name of a file relative to the new folder; absolute names are kept."""
+            if Path(name).is_absolute():
+                return name
+            return Path(os.path.relpath(self.resolve_path(name), start)).as_posix()
+
+        return format_toml(rename_files(self.tables(), rename))
 
     def effect_names(self) -> list[str]:
         """Return the names of the physical effects that the scene contains."""
@@ -299,12 +312,6 @@ def attach_written(
             ]
         ) from None
     return replace(scene, written=replace(written, sweep=()) if written.sweep else written)
-
-
-def move_scene(scene: Scene, path: Path) -> Scene:
-    """Return a copy of the scene for another path, with file names relative to the new folder."""
-    sets = make_relative_file_sets(scene, path.parent)
-    return replace(_read_scene(scene.text, path, [*scene.sets, *sets]), written=scene.written)
 
 
 def read_sweep_axes(text: str, path: str | Path) -> tuple[list[assignments.Axis], list[str]]:

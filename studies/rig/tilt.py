@@ -7,8 +7,8 @@ slip begins change by 6 and 8 % at 0.03 mrad; the pressure peak doubles at 0.011
 A tilt of 0.1 mrad leaves 22 % of the patch in contact and 1 mrad 2.4 %. The patch's shear stiffness falls from 4.039e8
 to 2.291e8 and 1.198e8 N/m, and half of the friction has given way after 95, 218 and 337 nm of slide: always far below
 the micrometre of the bonds and the micrometres of the motion. So the rig at 5 g hardly notices: its amplitude falls
-from 15.314 ± 0.007 um to 14.803 ± 0.006 and 14.239 ± 0.011 um, its loop area from 2.0423 ± 0.0013 mJ to 1.9615 ±
-0.0008 and 1.8712 ± 0.0014 mJ.
+from 15.32 ± 0.07 um to 14.807 ± 0.023 and 14.24 ± 0.07 um, its loop area from 2.043 ± 0.012 mJ to 1.962 ± 0.003 and
+1.871 ± 0.010 mJ.
 
 Run: python studies/rig/tilt.py
 """

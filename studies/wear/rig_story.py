@@ -8,7 +8,7 @@ loaded end, 38 % touches and the peak is 2.7 MPa; normal and tangential stiffnes
 303 N/um. With 1e-13 it is 97 % of the length and 1.20 um; the peak there, 0.78 +- 0.50 MPa, is hardly known, since
 jumps leave the freshly worn edge too high.
 
-The motion hardly sees it: amplitude 14.80, 15.04 and 15.31 um, loop 1.96, 2.00 and 2.04 mJ, since the same load slides
+The motion hardly sees it: amplitude 14.81, 15.03 and 15.32 um, loop 1.96, 2.00 and 2.04 mJ, since the same load slides
 the same way. Onset of slip (elastic-plastic patch, so that it is sharp) goes from 3.88 g to 3.90 and 4.00 g: a patch
 that touches all over slips as one, at mu N/m = 4.00 g. So an onset measured between 3.8 and 4.2 g does not tell a
 worn rig from a new one; the part of the faces that is rubbed does.

@@ -57,8 +57,9 @@ def test_exact_sweep_case_equals_single_run(whole_sweep, rig_scene):
     for row in found[:4]:
         sets = {"normal.load": row["normal.load"], "drive.acceleration": row["drive.acceleration"]}
         single = pf.run(rig_scene, **sets)
-        sentence = single.outcome.sentence if single.outcome == "transient" else ""
-        assert row["outcome"] == single.outcome and row["message"] == sentence
+        sentences = [single.outcome.sentence] if single.outcome == "transient" else []
+        sentences += [finding.sentence for finding in single.findings]
+        assert row["outcome"] == single.outcome and row["message"] == " ".join(sentences)
         stored = read_json(out / "cases" / row["case"] / "summary.json")
         assert (
             stored["case"] == sets

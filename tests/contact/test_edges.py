@@ -6,7 +6,7 @@ from contact_forms import hertz_half_width
 from pieces import TITANIUM, make_bare_layers, make_refined_grid
 from pressed import press
 
-from patchfem.contact import edges
+from patchfem.contact import edges, set_table
 from patchfem.core import Compliance, Interface, frozen_array
 from patchfem.elasticity import Piece, compute_interface_compliance
 
@@ -27,6 +27,16 @@ def spring_bed(n_nodes: int = 41) -> Compliance:
     )
 
 
+def find_edges(pieces: Compliance, force, gap, cells) -> tuple:
+    """Return the solution of a contact set for a unit approach, and the contact edges of nodal forces and gaps."""
+    x = pieces.interface.x
+    active = force > 0
+    solution = set_table.solve_set(pieces.normal, active, np.ones((1, x.size)))
+    rate = np.where(active, solution.force, solution.opening)
+    unknown = np.where(active, force, gap)[None]
+    return solution, edges.find_edges(x, active[None], unknown, rate, cells)
+
+
 @pytest.mark.parametrize("load", [3.0, 3.7, 4.4, 5.1, 2.1])
 def test_exact_wedge_on_springs_edge_and_stiffness(load):
     """The edge of a wedge on springs is at delta/angle, and the stiffness is that of the contact length."""
@@ -37,12 +47,14 @@ def test_exact_wedge_on_springs_edge_and_stiffness(load):
     weight = pieces.interface.weight
     state = press(pieces, angle * x, load)
     force = state.sigma_n * weight
-    pressed = edges.SetFactor(pieces.normal, force > 0)
-    (end,) = edges.find_edges(pressed, x, force, state.gap, softness=np.diag(pieces.normal))
+    cells = edges.EdgeCells(layer_fraction=np.ones(x.size))
+    solution, ends = find_edges(pieces, force, state.gap, cells)
+    (end,) = ends.list_edges(0)
     expected = state.approach / angle
     assert end.side == 1 and end.position == pytest.approx(expected, abs=1e-12)
     assert edges.contact_intervals(x, force, [end])[0] == pytest.approx([x[0], expected], abs=1e-12)
-    stiffness = edges.set_stiffness(pressed, np.ones((x.size, 1)), [end])[0]
+    change = edges.parabola_change(end.fraction - 0.5, solution.gain[0, 0], solution.loss[0, 0])
+    stiffness = solution.force[0].sum() + change
     assert stiffness == pytest.approx(k * WIDTH * (expected - x[0]), rel=1e-9)
 
 
@@ -68,8 +80,7 @@ def find_hertz_edges(hertz_block, load: float) -> tuple:
     weight = pieces.interface.weight
     state = press(pieces, x**2 / (2 * 57.7e-3), load)
     force = state.sigma_n * weight
-    pressed = edges.SetFactor(pieces.normal, force > 0)
-    return force, edges.find_edges(pressed, x, force, state.gap, row_height=row_height)
+    return force, find_edges(pieces, force, state.gap, edges.EdgeCells(row_height))[1].list_edges(0)
 
 
 def test_always_hertz_edges_are_accurate_to_fraction_of_element(hertz_block):

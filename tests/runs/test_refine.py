@@ -125,8 +125,8 @@ def test_exact_bench_has_more_steps_until_its_peak_meets_the_tolerance():
 def test_exact_passes_of_a_run_end_where_it_would_need_more_time(excess, passes, is_short):
     """Each pass takes twice the time of the one before and divides the excess by four; the axis has three finer passes.
 
-    A run whose passes would take more than its time ends with the first one, and knows what they would take. The clock is
-    that of the test.
+    A run whose last pass alone would take more than its time ends with the pass before, and knows what all passes would
+    take. The clock is that of the test.
     """
     clock = [100.0]
 
@@ -147,9 +147,30 @@ def test_exact_passes_of_a_run_end_where_it_would_need_more_time(excess, passes,
     limit = refine.RunLimit(needed - 0.5 if is_short else needed, 100.0, lambda: clock[0])
     solution, shortage = refine.refine(solve, 1, judge, limit)
     if is_short and passes > 1:
-        assert (solution, shortage) == (1, ("steps", needed, "accuracy.max_seconds"))
+        assert (solution, shortage) == (
+            2 ** (passes - 2),
+            ("steps", needed, "accuracy.max_seconds"),
+        )
     else:
         assert (solution, shortage) == (2 ** (passes - 1), None)
+
+
+def test_exact_pass_follows_that_the_time_allows_although_all_passes_would_not():
+    """A pass of 2 s follows one of 1 s within 4 s, although three passes are expected; it meets the tolerance by itself."""
+    clock = [0.0]
+
+    def solve(resolution: int, before: int | None) -> int:
+        """Take the CPU time of a resolution."""
+        clock[0] += resolution
+        return resolution
+
+    def judge(solution: int, excesses: list[float]) -> refine.Verdict:
+        """Find an error 44 times the allowed one in the first pass, and an allowed one in the second."""
+        return refine.Verdict(0.5) if excesses else refine.Verdict(44.0, 2, "mesh", 1.0, 2.0)
+
+    limit = refine.RunLimit(4.0, 0.0, lambda: clock[0])
+    assert judge(1, []).predict_seconds() > 4.0
+    assert refine.refine(solve, 1, judge, limit) == (2, None)
 
 
 def test_compiling_takes_no_time_of_a_run():

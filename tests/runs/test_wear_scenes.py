@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import read_json, run_cli, run_successfully
+from scene_runs import run_scene
 from scene_texts import (
     COATED,
     COULOMB,
@@ -293,3 +294,34 @@ def test_always_run_says_that_worn_depth_of_split_trace_is_a_mean(tmp_path, monk
     assert "at the deepest place of the mean over the short waves" in output
     assert "worn_depth_max is a mean over the short waves" in output
     assert "the layer itself does not wear" in output
+
+
+def run_worn_rig(contact: str, changes: list[str]):
+    """Return measures of a damped Coulomb rig with wear, which is steady after 100 cycles."""
+    drive = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
+    return run_scene(contact + COULOMB + MODE + drive + WEAR, "; ".join(changes)).measures
+
+
+@pytest.mark.parametrize("frequency", ["286 Hz", "71.5 Hz", "214.5 Hz"])
+def test_exact_volume_under_oscillating_load_is_friction_work(frequency):
+    """Under Coulomb's law the worn volume is coefficient/mu times the friction work, whatever the load does."""
+    changes = [
+        "structure.mode.axial.damping=0.02",
+        "normal.amplitude=60 N",
+        f"normal.frequency={frequency}",
+    ]
+    found = run_worn_rig(POINT, changes)
+    volume, area = found["worn_volume"], found["loop_area"]
+    expected = KAPPA * CYCLES * area.value / 0.3
+    assert abs(volume.value - expected) <= volume.error + expected * area.error / area.value
+    assert volume.error < 1e-3 * volume.value
+
+
+def test_always_method_harmonic_gives_the_wear_of_the_motion_in_time():
+    """Wear of the periodic motion that is found directly is that of the motion after its transient."""
+    changes = ["structure.mode.axial.damping=0.02", "accuracy.tolerance=1e-2"]
+    in_time = run_worn_rig(TILTED, changes)
+    periodic = run_worn_rig(TILTED, [*changes, "accuracy.method=harmonic"])
+    for name in ("worn_volume", "worn_depth_max"):
+        first, second = in_time[name], periodic[name]
+        assert abs(first.value - second.value) <= 1e-3 * first.value

@@ -16,20 +16,23 @@ PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
 IWAN = "{law}.law=iwan {law}.stiffness=1e7_N/m {law}.chi=-0.5 {law}.beta=0.5"
 TANH = "{law}.law=tanh {law}.reference_speed=1_mm/s"
 BONDS = "{law}.law=nonlocal {law}.bond_length=1_um"
+INTERLOCKING = "structure.bonded.stiffness=1e5_N/m structure.bonded.wavelength=80_um"
+EXPONENTIAL = "{patch}.asperities.law=exponential {patch}.asperities.decay_length=1_um"
+HERTZ = (
+    "{patch}.asperities.law=hertz {patch}.asperities.radius=1_um {patch}.asperities.density=1e10_1/m^2 "
+    "{patch}.asperities.height_deviation=1_um"
+)
 GROOVES = "{load}.grooves.wavelength=80_um {load}.grooves.amplitude=1_um"
 OWN_PATCH = "{patch}.length=10_mm {patch}.width=10_mm {patch}.height=5_mm {patch}.load=60_N {patch}.substrate=steel"
 WEAR = "wear.coefficient=1e-14_m^2/N wear.cycles=1000"
 # Assignments that give a scene a feature, separated by blanks; _ stands for the blank in a quantity.
 SETS = {
-    "accuracy.method=harmonic": "accuracy.method=harmonic",
     "accuracy.quadrature=recursion": "accuracy.quadrature=recursion",
     "accuracy.quadrature=merged": f"{BONDS} {{law}}.reading=report accuracy.quadrature=merged",
     "bonds that no force can move": f"{BONDS} {{law}}.reading=report {{law}}.order=-0.5",
     "bonds of a given stiffness": "{law}.law=elastic-plastic {law}.stiffness=1e7_N/m",
     "changing load": "{change}",
-    "contact.grooves": GROOVES,
     "drive other than a sine": "drive.waveform=step",
-    "drive.kind=free": "drive.kind=free drive.displacement=1_mm",
     "grooves": GROOVES,
     "interface": "",
     "kinetic below static": "{law}.law=coulomb {law}.kinetic=0.2",
@@ -39,28 +42,24 @@ SETS = {
     "law for rigid pieces": IWAN,
     "law of an averaged pressure": "{law}.law=convolution {law}.bond_length=1_um",
     "law that sticks rigidly": "{law}.law=coulomb",
+    "memory of the slip": BONDS,
     "law with memory for a constant pressure": IWAN,
     "law with memory but without bonds": "{law}.law=elastic-plastic",
     "law without bonds": "{law}.law=coulomb",
     "law without elements": TANH,
-    "levels or sweep in time": "drive.waveform=levels drive.levels=['1_g','2_g']",
     "load on a point": "",
+    "joint without a single stiffness": "{change}",
+    "nonlinear asperities": EXPONENTIAL,
+    "output that bounds the motion": "structure.travel=1_mm",
     "mode with heave or pitch": "structure.mode.second.pitch=1_rad/m",
     "mode with yaw": "structure.mode.second.yaw=1_rad/m",
     "named method of the sum": f"{BONDS} accuracy.quadrature=direct",
     "no friction": "{law}.static=0",
-    "normal.amplitude": "normal.amplitude=5_N normal.frequency=50_Hz",
     "normal.grooves": GROOVES,
+    "normal.amplitude": "normal.amplitude=5_N normal.frequency=50_Hz",
     "partial slip": "{patch}.shear={{}}",
     "patch of an interface": OWN_PATCH,
     "patch.approach": "{patch}.approach.distance=1_um",
-    "patch.asperities.law=exponential": (
-        "{patch}.asperities.law=exponential {patch}.asperities.decay_length=1_um"
-    ),
-    "patch.asperities.law=hertz": (
-        "{patch}.asperities.law=hertz {patch}.asperities.radius=1_um {patch}.asperities.density=1e10_1/m^2 "
-        "{patch}.asperities.height_deviation=1_um"
-    ),
     "patch.grooves": "{patch}.grooves.wavelength=80_um {patch}.grooves.amplitude=1_um",
     "patch.holder.tangential_stiffness": "{patch}.holder.tangential_stiffness=1e7_N/m",
     "patch.area": "{patch}.area.cells=64",
@@ -74,12 +73,9 @@ SETS = {
     ),
     "single contact point": "",
     "spread of the bonds": f"{BONDS} {{law}}.spread=1_um",
-    "structure.bonded.wavelength": (
-        "structure.bonded.stiffness=1e5_N/m structure.bonded.wavelength=80_um"
-    ),
+    "structure.bonded.wavelength": INTERLOCKING,
     "structure.measured=stuck": "structure.measured=stuck",
     "structure.stiffening": "structure.stiffening.cubic=1e10_N/m^3",
-    "structure.travel": "structure.travel=1_mm",
     "sum by recursion": "",
     "sum over all bonds": f"{BONDS} {{law}}.order=2",
     "sum over all stretched bonds": f"{BONDS} {{law}}.order=2",
@@ -102,7 +98,7 @@ REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
     + LINEAR[LINEAR.index("[drive]") :]
 )
 POINT_FEATURES = {"load on a point", "single contact point", "normal.amplitude", "normal.grooves"}
-MASS_FEATURES = {"interface", "several interfaces", "structure.interface", "patches of interfaces"}
+MASS_FEATURES = {"interface", "several interfaces", "structure.interface"}
 
 
 FILE = """\
@@ -130,15 +126,9 @@ def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
     if features == {"law for one interface", "patch of an interface"}:
         law = "structure.interface.0"
         return SINGLE + FORCED, words | {"law": law, "patch": f"{law}.contact"}
-    if "patches of interfaces" in features:
-        return FILE + FORCED, words | {"patch": "structure.interface.0.contact"}
     if features & (MASS_FEATURES | {"patch of an interface", "law without elements"}):
         law = "structure.interface.0"
         return PAIR + FORCED, words | {"law": law, "patch": f"{law}.contact"}
-    if "structure.masses" in features:
-        return PAIR.split("[[structure.interface]]")[0] + FORCED, words
-    if "structure.reduced" in features:
-        return REDUCED, words
     if features & POINT_FEATURES:
         words |= {"load": "normal", "change": SETS["normal.amplitude"]}
         return (BENCH if "bench" in features else POINT_RIG), words
@@ -174,12 +164,39 @@ def test_refuses_each_row_of_support(names, instead):
     assert " with is " not in found and not found.endswith("; ")
 
 
+WITH_PATCH = FILE + FORCED, OWN_PATCH.format(patch="structure.interface.0.contact")
+STUCK = "structure.measured: 'stuck' with "
+CAUSES = [
+    (PAIR.split("[[structure.interface]]")[0] + FORCED, "structure.measured=stuck", STUCK + "structure.masses"),
+    (REDUCED, "structure.measured=stuck", STUCK + "structure.reduced"),
+    (WITH_PATCH[0], f"structure.measured=stuck {WITH_PATCH[1]}", STUCK + "[structure.interface.contact]"),
+    (RIG, f"structure.measured=stuck {INTERLOCKING}", STUCK + "structure.bonded.wavelength"),
+    (RIG, f"structure.measured=stuck {GROOVES.format(load='contact')}", STUCK + "contact.grooves"),
+    (POINT_RIG, f"structure.measured=stuck {GROOVES.format(load='normal')}", STUCK + "normal.grooves"),
+    (POINT_RIG, f"structure.measured=stuck {SETS['normal.amplitude']}", STUCK + "normal.amplitude"),
+    (RIG, "structure.measured=stuck structure.mode.second.yaw=1_rad/m contact.strips.count=4",
+     STUCK + "structure.mode[2].yaw"),
+    (RIG, "structure.mode.second.gauge=0.3 structure.stiffening.cubic=1e10_N/m^3", "with structure.stiffening; give"),
+    (RIG, "structure.mode.second.gauge=0.3 drive.kind=free drive.displacement=1_mm", "with drive.kind = 'free'; give"),
+    (RIG, "structure.mode.second.gauge=0.3 drive.waveform=levels drive.levels=['1_g','2_g']",
+     "with drive.waveform = 'levels'; give"),
+    (RIG, f"{WEAR} drive.kind=free drive.displacement=1_mm", "use waveform 'sine' with kind 'base' or 'force'"),
+    (RIG, f"{HERTZ.format(patch='contact')} {SETS['mode with heave or pitch']}", "'hertz' with a mode's pitch"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text, changes, words", CAUSES)
+def test_refuses_each_cause_of_a_feature(text, changes, words):
+    """A feature of a row that several keys cause is found for each of them, and the message names the key."""
+    with pytest.raises(SceneError) as refused:
+        loads(text, "a.toml", [write_blanks(change) for change in changes.split()])
+    assert any(words in message for message in refused.value.mistakes), refused.value.mistakes
+
+
 # Two rows that apply to a scene at the same key: (features of both, the key, end of the only message at it).
 OVERLAPS = [
     ("patch.area, law of an averaged pressure, partial slip", "contact.area", "leave out this entry"),
     ("normal.amplitude, bench, law for flat faces, normal.grooves", "normal.amplitude", "leave one of the two out"),
-    ("law for one interface, several interfaces, partial slip", "structure.interface[1].law",
-     "leave out [structure.interface.contact.shear], or use law 'coulomb' or 'elastic-plastic'"),
 ]  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pieces import COATED, COATING, HEIGHT, LENGTH, WIDTH, make_bare_layers
 
-from patchfem.contact import coupled_stiffness, tangential_stiffness
+from patchfem.contact import solve_set, tangential_stiffness
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import Piece, compute_interface_compliance
 from patchfem.mesh import make_graded_grid
@@ -41,6 +41,10 @@ def test_exact_coupled_stiffness_agrees_with_schur_complement():
     schur = pieces.tangential[contact] - contact_coupling.T @ np.linalg.solve(
         pieces.normal[contact], contact_coupling
     )
-    stiffness = coupled_stiffness(pieces.normal, pieces.tangential, coupling, active)
+    block = np.block([[pieces.normal, coupling], [coupling.T, pieces.tangential]])
+    slide = np.repeat([[0.0, 1.0]], active.size, axis=1)
+    force = solve_set(block, active, slide).force[0]
+    stiffness = force @ slide[0]
     assert stiffness == pytest.approx(np.linalg.solve(schur, ones).sum(), rel=1e-11)
+    assert not force[: active.size][~active].any()
     assert stiffness > (1 + 1e-6) * tangential_stiffness(pieces.tangential, active)

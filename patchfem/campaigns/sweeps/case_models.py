@@ -4,27 +4,28 @@ In: the text of a scene, and the keys of a case as strings. Out: a Model. If a c
 earlier one only in plain numbers, its model is derived without parsing the scene again.
 """
 
+from __future__ import annotations
+
 import json
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from ... import __version__
 from ...core import PatchfemError
 from ...disk.file_hashes import hash_named_files, iterate_texts
 from ...model.model import Model, build
-from ...model.similar_models import SimilarModels
 from ...model.structure import JOINT_WORDS, name_joint_source
 from ...scene.files import require_files
 from ...scene.lines import split_assignment
-from ...scene.overrides import BaseScene
+from ...scene.overrides import BaseScene, PlainNumbers
 from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
+
+MAX_CACHED_MODELS = 64  # models of a sweep from which those of similar cases are derived
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,37 +81,46 @@ class SweepScene:
                 f"internal fault, please report it: {type(error).__name__}: {error}"
             ) from error
 
-    def make_similar_models(
-        self,
-        keys: Sequence[str],
-        values: np.ndarray,
-        sets: Callable[[int], Sequence[str]],
-        cases: np.ndarray,
-    ) -> SimilarModels | None:
-        """Return the models of cases that differ only in the numbers of some keys.
+    def find_plain_keys(self, keys: Sequence[str], sets: Sequence[str]) -> tuple[str, ...]:
+        """Return those of the swept keys whose numbers no check of the scene depends on.
 
-        Returns None if one of the values requires a validation of the scene.
+        Cases that differ only in them have similar models. `sets` are the ``table.key=value`` strings of a case; the result
+        is () if it is not valid.
+        """
+        base = _get_cached_base(self).scene
+        try:
+            return base.find_plain_numbers(base.override(sets), keys).keys if base else ()
+        except SceneError:
+            return ()
+
+    def build_similar_base(self, keys: tuple[str, ...], sets: Sequence[str]) -> SimilarBase | None:
+        """Return the model from which those of cases with other numbers of some keys are derived.
+
+        It is None if the scene of the case is not valid, or if its checks depend on one of these numbers.
 
         Parameters
         ----------
-        keys : sequence of str
-            The k keys, as "table.key".
-        values : (n, k) array
-            Values of the keys [SI].
-        sets : callable
-            Function from the number of a case to its ``table.key=value`` strings.
-        cases : (n,) array
-            Numbers of the cases.
+        keys : tuple of str
+            Plain keys, as `find_plain_keys` returns them.
+        sets : sequence of str
+            ``table.key=value`` strings of one of the cases, which have those of all other keys in common.
         """
-        keys = tuple(keys)
         base, models = _get_cached_base(self)
-        if keys not in models:
-            scene = base and self.read_scene(sets(int(cases[0])))
-            plain = base and base.plain_numbers(scene, keys)
-            models[keys] = plain and (plain, build(scene))
-        if not models[keys] or not models[keys][0].are_plain(values):
+        shared = frozenset(text for text in sets if split_assignment(text)[0] not in keys)
+        if (keys, shared) in models or base is None:
+            return models.get((keys, shared))
+        try:
+            scene = base.override(sets)
+            numbers = base.find_plain_numbers(scene, keys)
+            if numbers.keys != keys:
+                return None
+            similar = SimilarBase(numbers, build(scene))
+        except PatchfemError:  # each case reports its own error
             return None
-        return SimilarModels(*models[keys], values, sets, cases)
+        if len(models) >= MAX_CACHED_MODELS:
+            models.clear()
+        models[keys, shared] = similar
+        return similar
 
     def find_errors(self, sets: Sequence[str]) -> list[str]:
         """Return the validation errors of the scene of a case; [] if it is valid.
@@ -174,15 +184,26 @@ class SweepScene:
         return has_contact and not {"contact.element_size", "contact.mesh"} & set_keys
 
 
+class SimilarBase(NamedTuple):
+    """Model of a case, from which those of cases with other plain numbers are derived.
+
+    - plain_numbers: scene of the model, and the keys of the numbers.
+    - model: the model.
+    """
+
+    plain_numbers: PlainNumbers
+    model: Model
+
+
 class _SweepBase(NamedTuple):
     """Base from which the scenes and models of all cases of a sweep are derived.
 
     - scene: the scene, or None if it is invalid without the values of a case.
-    - models: base models by the swept keys, or None if no models can be derived from them.
+    - models: models of cases from which others are derived, by the plain keys and by the assignments of the other keys.
     """
 
     scene: BaseScene | None
-    models: dict[tuple, tuple | None]
+    models: dict[tuple[tuple[str, ...], frozenset[str]], SimilarBase]
 
 
 @lru_cache(maxsize=2)

@@ -1,6 +1,7 @@
 """Cases of a sweep: all combinations of the values of its keys, or the rows of a table."""
 
 import json
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -108,18 +109,34 @@ class Cases:
         grid = np.meshgrid(*(np.rint(place).astype(int) for place in places), indexing="ij")
         return np.ravel_multi_index(grid, self.shape).ravel().tolist()
 
-    def sort_by_pieces(self, numbers: Sequence[int]) -> list[int]:
-        """Sort case numbers so that cases whose pieces have the same shape and material are consecutive.
+    def split_into_groups(
+        self, numbers: Sequence[int], plain_keys: Sequence[str]
+    ) -> list[np.ndarray]:
+        """Return the places in `numbers` of the cases of each group, whose cases differ in plain keys alone.
 
-        Such cases have most computations in common. Cases with equal patches are consecutive, too.
+        Groups with the same pieces are consecutive, and so are cases of a group with equal patches, because they have most
+        computations in common.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            Numbers of the cases.
+        plain_keys : sequence of str
+            Keys with numbers in which similar models differ.
         """
-        contact_axes = [k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")]
-        if not contact_axes:
-            return list(numbers)
-        contact_axes.sort(key=lambda k: not self.axes[k].key.startswith(PIECE_KEYS))
-        columns = self.make_columns(numbers)
-        order = np.lexsort([columns[k] for k in reversed(contact_axes)])
-        return np.asarray(numbers)[order].tolist()
+        ranked = []
+        for axis, column in zip(self.axes, self.make_columns(numbers)):
+            is_plain = axis.key in plain_keys
+            is_contact = axis.key.startswith("contact.")
+            rank = (is_plain, not axis.key.startswith(PIECE_KEYS), not is_contact)
+            if is_contact or not is_plain:
+                ranked.append((rank, np.unique(column, return_inverse=True)[1]))
+        ranked.sort(key=lambda pair: pair[0])
+        codes = np.array([column for _, column in ranked], int).reshape(len(ranked), len(numbers))
+        order = np.lexsort(codes[::-1]) if ranked else np.arange(len(numbers))
+        n_shared = sum(not is_plain for (is_plain, *_), _ in ranked)
+        is_next = np.diff(codes[:n_shared, order]).any(axis=0)
+        return np.split(order, np.flatnonzero(is_next) + 1)
 
     def compute_hashes(self, sweep_scene: SweepScene) -> np.ndarray:
         """Return hashes (n,) uint64 of the cases, which identify them in any sweep of the scene.
@@ -132,10 +149,10 @@ class Cases:
         order = np.argsort([axis.key for axis in self.axes], kind="stable")
         texts = [_describe_values(axis, sweep_scene.path.parent) for axis in self.axes]
         common_text = sweep_scene.hash_common_data()
+        indices = self.axis_indices(np.arange(len(self)))
+        columns = [map(texts[axis].__getitem__, indices[axis].tolist()) for axis in order]
         hashes = np.empty(len(self), np.uint64)
-        for number in range(len(self)):
-            indices = self.axis_indices(number)
-            values = [texts[axis][int(indices[axis])] for axis in order]
+        for number, values in enumerate(zip(*columns)):
             hashes[number] = _hash_to_integer("\n".join([common_text, *values]).encode())
         if sweep_scene.has_shared_meshes([axis.key for axis in self.axes]):
             hashes ^= np.uint64(_hash_to_integer(np.sort(hashes).tobytes()))
@@ -162,10 +179,11 @@ def _hash_to_integer(content: bytes) -> int:
 
 def take_values(axis: Axis, indices: Sequence[int]) -> Axis:
     """Return a swept key, an axis, with the values at some indices."""
+    values = [axis.values[index] for index in indices]
     return replace(
         axis,
         texts=tuple(axis.texts[index] for index in indices),
-        values=tuple(axis.values[index] for index in indices),
+        values=array("d", values) if isinstance(axis.values, array) else tuple(values),
     )
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .extremes import Extreme, find_extreme
 from .limits import CHANGE_AT_LIMIT, KeyLimit, find_limits
 from .peaks import PeakOnLine, find_peaks
 from .ranking import SobolIndex, compute_quantiles, rank_keys
@@ -44,6 +45,8 @@ class SweepAnalysis:
         Counts of `SweepTable.count_cases`.
     ranges : list of MeasureRange
         Ranges of the main measures that vary by more than their errors, largest change first.
+    extremes : list of Extreme
+        Smallest or largest values of the main measures that are not monotonic over the only key that varies.
     limits : list of KeyLimit
         Values of the keys up to which measures stay within limits.
     peaks : list of PeakOnLine
@@ -56,6 +59,7 @@ class SweepAnalysis:
 
     cases: dict[str, int | dict]
     ranges: list[MeasureRange]
+    extremes: list[Extreme]
     limits: list[KeyLimit]
     peaks: list[PeakOnLine]
     ranking: dict[str, list[SobolIndex]]
@@ -76,6 +80,7 @@ def analyse(table: SweepTable) -> SweepAnalysis:
     return SweepAnalysis(
         cases=table.count_cases(),
         ranges=ranges,
+        extremes=list(filter(None, (find_extreme(table, entry.measure) for entry in ranges))),
         limits=find_limits(table) if is_comparable else [],
         peaks=find_peaks(table),
         ranking=rank_keys(table),

@@ -6,8 +6,9 @@ In: `WorkerData`, case numbers and an executor of `executors/`. Out: results by 
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from time import perf_counter
 
 import numpy as np
@@ -25,7 +26,9 @@ from .cases import Cases
 # Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
 # with a sweep.
 TARGET_CHUNK_SECONDS = 1.0
-MAX_CASES_PER_CHUNK = 1024  # Largest number of cases in a chunk.
+MAX_CASES_PER_CHUNK = 4096  # Largest number of cases in a chunk.
+MIN_SIMILAR_CASES = 2  # Smallest number of cases whose models are derived from one of them.
+MAX_CASES_TRIED = 3  # Cases that are tried until one is valid, which shows the plain keys.
 MAX_MESH_CASES = 256  # Largest number of cases that determine the shared meshes of a sweep.
 
 
@@ -48,6 +51,11 @@ class WorkerData:
         keep(number, Result) is called after each run.
     meshes : SharedMeshes or None
         Meshes common to all cases, from `choose_shared_meshes`.
+    plain_keys : tuple of str
+        Swept keys whose numbers no check depends on, from `find_plain_keys`; cases that differ only in them have similar
+        models.
+    group : hashable or None
+        Key of the engine that computes similar cases together, from `batches.find_group`.
     """
 
     sweep_scene: SweepScene
@@ -55,6 +63,13 @@ class WorkerData:
     extract: Callable | None = None
     keep: Callable | None = None
     meshes: SharedMeshes | None = None
+    plain_keys: tuple[str, ...] = ()
+    group: Hashable | None = None
+
+    @property
+    def has_blocks(self) -> bool:
+        """Whether the cases are static patches that are solved together in fixed blocks."""
+        return bool(self.plain_keys) and self.group == batches.STATIC_GROUP
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,45 +101,60 @@ def compute_chunk(
         Elapsed time [s] without compilation, and a tuple of CaseResults and a list of the data that
         `work.extract` returns for each case.
     """
-    # Cases that differ in numbers alone share what the numbers do not change. The batch numbers its cases from 0.
+    # The cases are computed in groups, of which each may have its own engine. A batch numbers its cases from 0.
     begin = perf_counter() - compiled.COMPILE_SECONDS[0]
-    models = _build_similar_models(work, numbers)
-    if models is None:
-        models = [_build_case_model(work, number) for number in numbers]
-    keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
-    results = batches.solve_models(models, keep, say, True, len(work.cases))
-    extras = []
-    if work.extract is not None:
-        for case, (number, model) in enumerate(zip(numbers, models)):
-            extras.append(work.extract(number, model, results, case))
+    numbers = np.asarray(numbers, int)
+    results = CaseResults.blank(len(numbers))
+    extras = [None] * len(numbers)
+    # Cases whose results are kept are single runs, and so the only group.
+    keep = work.keep and (lambda case, result: work.keep(int(numbers[case]), result))
+    for places, models in _group_models(work, numbers):
+        part = batches.solve_models(models, keep, say, len(work.cases))
+        results.insert(places, part)
+        for case, place in enumerate(places.tolist()) if work.extract is not None else ():
+            # The title and the effects of similar models are the same.
+            model = models.first if isinstance(models, SimilarModels) else models[case]
+            extras[place] = work.extract(int(numbers[place]), model, part, case)
     seconds = perf_counter() - compiled.COMPILE_SECONDS[0] - begin
-    return seconds, (results, extras)
+    return seconds, (results, extras if work.extract is not None else [])
 
 
-def _build_similar_models(work: WorkerData, numbers: Sequence[int]) -> SimilarModels | None:
-    """Return the models of cases that differ only in numbers that no check depends on; None for other cases.
+def _group_models(
+    work: WorkerData, numbers: np.ndarray
+) -> Iterator[tuple[np.ndarray, Sequence[Model | PatchfemError]]]:
+    """Yield the places in `numbers` of the cases of each group, and their models, or the errors of their scenes.
 
-    It is also None for patches in motion, and if `work.keep` is called with the result of each run.
+    Cases of a group differ in plain numbers alone, so that their models are similar; all other cases are the last group.
+    `work` is the data of the sweep.
     """
-    columns = work.cases.make_columns(numbers)
-    if work.keep is not None or any(column.dtype.kind != "f" for column in columns):
-        return None
-    try:
-        models = work.sweep_scene.make_similar_models(
-            [axis.key for axis in work.cases.axes],
-            np.array(columns).T,
-            work.cases.assignments,
-            np.asarray(numbers),
+    cases = work.cases
+    is_single = np.ones(len(numbers), bool)
+    keys = work.plain_keys
+    columns = dict(zip([axis.key for axis in cases.axes], cases.make_columns(numbers)))
+    for places in cases.split_into_groups(numbers, keys) if keys else ():
+        if len(places) < MIN_SIMILAR_CASES:
+            continue
+        base = None
+        for place in places[[len(places) // 2, 0, -1]].tolist():
+            sets = cases.assignments(int(numbers[place]))
+            base = base or work.sweep_scene.build_similar_base(keys, sets)
+        if base is None or (base.model.patch is not None and base.model.kind != "patch"):
+            continue
+        model = base.model if work.meshes is None else work.meshes.with_shared_meshes(base.model)
+        values = np.array([columns[key][places] for key in keys]).T
+        is_plain = base.plain_numbers.are_plain(values)
+        places = places[is_plain]
+        is_single[places] = False
+        yield (
+            places,
+            SimilarModels(
+                base.plain_numbers, model, values[is_plain], cases.assignments, numbers[places]
+            ),
         )
-    except PatchfemError:  # The first case has no model.
-        return None
-    if models is None or models.first.patch is None:
-        return models
-    if models.first.kind != "patch":
-        return None
-    if work.meshes is None:
-        return models
-    return replace(models, first=work.meshes.with_shared_meshes(models.first))
+
+    places = np.flatnonzero(is_single)
+    if places.size:
+        yield places, [_build_case_model(work, int(number)) for number in numbers[places]]
 
 
 def _build_case_model(work: WorkerData, number: int):
@@ -139,34 +169,44 @@ def _build_case_model(work: WorkerData, number: int):
     return model if work.meshes is None else work.meshes.with_shared_meshes(model)
 
 
-def choose_shared_meshes(work: WorkerData) -> WorkerData:
-    """Return the data of a sweep, `work`, with meshes that are chosen for all its cases together.
+def prepare_work(work: WorkerData) -> WorkerData:
+    """Return the data of a sweep, `work`, with what all its cases determine together: plain keys, engine and meshes.
 
-    All cases of the sweep count, also those that are already computed. Without a patch the data are unchanged.
+    All cases of the sweep count, also those that are already computed. No meshes are chosen without a patch, or for
+    patches that are solved in blocks, each of which has its own meshes.
     """
-    if work.meshes is not None:
+    cases = work.cases
+    keys = [axis.key for axis in cases.axes]
+    for number in cases.spread_case_numbers(MAX_CASES_TRIED):
+        first = _build_case_model(work, number)
+        if isinstance(first, Model):
+            break
+    else:  # the run of each case reports its error
         return work
-    numbers = work.cases.spread_case_numbers(MAX_MESH_CASES)
-    models = []
-    for number in numbers:
-        models.append(_build_case_model(work, number))
-        if isinstance(models[-1], Model) and models[-1].patch is None:
-            return work
-    return replace(work, meshes=SharedMeshes(models, len(numbers) == len(work.cases)))
+    if work.keep is None:
+        plain_keys = work.sweep_scene.find_plain_keys(keys, cases.assignments(number))
+        work = replace(work, plain_keys=plain_keys, group=batches.find_group(first, len(cases)))
+    if first.patch is None or work.has_blocks:
+        return work
+    numbers = cases.spread_case_numbers(MAX_MESH_CASES)
+    models = chain.from_iterable(group for _, group in _group_models(work, np.array(numbers)))
+    return replace(work, meshes=SharedMeshes(models, len(numbers) == len(cases)))
 
 
-def _find_min_chunk_size(work: WorkerData) -> int:
-    """Return the smallest number of cases per chunk.
+def _list_blocks(work: WorkerData, numbers: Sequence[int]) -> list[list[int]]:
+    """Return the blocks of a sweep of static patches that contain some of the given cases.
 
-    It is 1, or more for cases that one call of a kernel computes together; the time of a smaller chunk would not
-    predict that of a large one. `work` is the data of the sweep.
+    A block is a range of the cases of a group. It does not depend on the cases that are already computed, nor on the number
+    of workers, so that an interrupted sweep ends with the same numbers.
     """
-    model = _build_case_model(work, 0)
-    if work.keep is not None or not isinstance(
-        model, Model
-    ):  # The run of the case reports its error.
-        return 1
-    return batches.MIN_CHUNK_CASES if batches.find_group(model, len(work.cases)) else 1
+    is_requested = np.zeros(len(work.cases), bool)
+    is_requested[np.asarray(numbers, int)] = True
+    blocks = []
+    for group in work.cases.split_into_groups(range(len(work.cases)), work.plain_keys):
+        for block in np.array_split(group, -(-len(group) // batches.static.CASES_PER_BLOCK)):
+            if is_requested[block].any():
+                blocks.append(block.tolist())
+    return blocks
 
 
 class ChunkQueue:
@@ -180,11 +220,20 @@ class ChunkQueue:
         Number of workers that take chunks.
     min_size : int
         Smallest number of cases per chunk, used with a single worker.
+    blocks : sequence of list of int
+        Chunks with given cases, which come first.
     """
 
-    def __init__(self, numbers: Sequence[int], workers: int, min_size: int = 1):
+    def __init__(
+        self,
+        numbers: Sequence[int],
+        workers: int,
+        min_size: int = 1,
+        blocks: Sequence[list[int]] = (),
+    ):
         self.min_size = min_size
         self.remaining = deque(numbers)
+        self.blocks = deque(blocks)
         self.suspects: deque[int] = deque()
         self.repeated: set[int] = set()
         self.workers = max(workers, 1)
@@ -197,6 +246,8 @@ class ChunkQueue:
         Cases of failed chunks are repeated last and one by one, only if `is_idle`, that is, if no other chunk is being
         computed, so that a case that kills its worker then has done it itself.
         """
+        if self.blocks:
+            return self.blocks.popleft()
         n_remaining = len(self.remaining)
         if not n_remaining:
             if not (self.suspects and is_idle):
@@ -248,11 +299,14 @@ def iterate_chunks(
     """
     if not len(numbers):
         return
-    work = choose_shared_meshes(work)
-    # With several workers, this process does not import the code that runs a case, which
-    # `_find_min_chunk_size` needs.
-    min_size = _find_min_chunk_size(work) if executor.workers == 1 else 1
-    chunks = ChunkQueue(work.cases.sort_by_pieces(numbers), executor.workers, min_size)
+    work = prepare_work(work)
+    if work.has_blocks:
+        chunks = ChunkQueue((), executor.workers, blocks=_list_blocks(work, numbers))
+    else:
+        # The time of a small chunk would not predict that of a large one whose cases a kernel computes together.
+        min_size = batches.MIN_CHUNK_CASES if work.group and executor.workers == 1 else 1
+        order = np.concatenate(work.cases.split_into_groups(numbers, work.plain_keys))
+        chunks = ChunkQueue(np.asarray(numbers)[order].tolist(), executor.workers, min_size)
     for chunk, seconds, answer in executor.run(work, chunks.take_chunk, say):
         if not isinstance(answer, WorkerDeath):
             chunks.seconds_per_case = seconds / len(chunk)

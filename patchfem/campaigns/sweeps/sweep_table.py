@@ -172,12 +172,16 @@ class SweepTable:
             column.values[numbers] = part.values[name]
             column.errors[numbers] = part.errors[name]
             column.floors[numbers] = np.nan_to_num(part.floors[name])
-        self.messages.update({int(numbers[k]): text for k, text in part.messages.items()})
         self.faults.update(dict.fromkeys(part.faults))
-        for k, outcome in enumerate(map(str, part.outcome)):
-            if outcome in tuple(Outcome) and outcome not in FINAL_OUTCOMES:
-                warnings = part.warnings.get(k, ()) if outcome == Outcome.NOT_CONVERGED else ()
-                self.messages[int(numbers[k])] = " ".join([Outcome(outcome).sentence, *warnings])
+        for texts in (part.messages, part.findings):
+            self.messages.update({int(numbers[k]): text for k, text in texts.items()})
+
+        # A case that has not settled says so first.
+        unsettled = [one for one in Outcome if one not in FINAL_OUTCOMES]
+        for outcome in unsettled:
+            for k in np.flatnonzero(part.outcome == str(outcome)):
+                words = [outcome.sentence, part.findings.get(k, "")]
+                self.messages[int(numbers[k])] = " ".join(filter(None, words))
 
     def select_trusted(self, name: str) -> np.ndarray:
         """Return the values (n,) of the measure `name` that count for statements on it, or NaN for others.

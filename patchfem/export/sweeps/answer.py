@@ -99,6 +99,7 @@ def _make_details(table: SweepTable, analysis: SweepAnalysis) -> JsonObject:
     return {
         "cases": analysis.cases,
         "ranking": analysis.ranking,
+        "extremes": analysis.extremes,
         "limits": [limit for limit in analysis.limits if np.isfinite(limit.value)],
         "peaks": peaks,
         "quantiles": quantiles,
@@ -172,7 +173,7 @@ def _make_data(table: SweepTable, case_folders: Sequence[str]) -> Variables:
     words = {"outcome": (table.outcome, "how the case ended")}
     if table.messages:
         messages = [table.messages.get(number, "") for number in range(len(table))]
-        words["message"] = (messages, "why the case failed or did not settle")
+        words["message"] = (messages, "why the case failed, did not settle or misses its tolerance")
     if len(case_folders):
         words["folder"] = (case_folders, "folder of the case inside cases/")
     for name, (values, text) in words.items():

@@ -23,6 +23,7 @@ from .answer import identify_sweep, make_answer, read_tolerance, sort_measures
 from .folder import Folder, Writer
 
 MAX_CASES_WITH_SUMMARY = 1000  # cases whose summaries are stored by default
+N_ROWS_PER_PART = 4096  # rows of sweep.csv whose cells are in memory at the same time
 MAX_CASES_WITH_TABLES = 200_000  # cases of which sweep.csv is written without --collect
 
 
@@ -120,7 +121,8 @@ def sweep_into(
                 else:
                     writer.put(chunk, results, texts)
                 folder.remove_tables()  # they are outdated once a case is computed
-                n_done += len(chunk)
+                # The cases of a block that are already stored are computed again.
+                n_done = min(n_done + len(chunk), requested.size)
                 report_progress(n_done, requested.size)
         except (KeyboardInterrupt, PatchfemError):
             if not is_shard:
@@ -131,9 +133,9 @@ def sweep_into(
         # the tables of a shard would lack the cases of the others
         if is_shard:
             return None
-        answer = write()
+        # Chunks are merged before the tables are in memory.
         folder.clean(removes_others=not place.resume, keep=keep)
-    return answer
+        return write()
 
 
 def _note_stored_cases(folder: Folder, count: int, total: int, say: Callable[[str], None]) -> None:
@@ -172,28 +174,17 @@ def write_tables(
     unstored_results : sequence
         (numbers, CaseResults) of cases that are not in the chunks.
     is_collected : bool
-        Whether every case must have a result, and sweep.csv is written for any number of cases.
+        Whether sweep.csv is written for any number of cases.
 
     Returns
     -------
     Answer or None
         None, and no files, if no case has a result.
-
-    Raises
-    ------
-    Missing
-        If a case has no result although all must have one.
     """
     table = SweepTable.blank(cases, read_tolerance(sweep_scene, cases))
     for numbers, results in chain(folder.chunks.iterate_results(), unstored_results):
         table.insert(numbers, results)
-    n_missing = int(np.sum(table.outcome == ""))
-    if is_collected and n_missing:
-        raise Missing(
-            f"{folder.shown}: {n_missing} of {len(table)} cases have no answer; run their shards again, "
-            "or continue with --resume"
-        )
-    if n_missing == len(table):
+    if (table.outcome == "").all():
         return None
 
     folder.remove_tables("sweep.csv", answers.PAGE_FILE)
@@ -224,23 +215,36 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
     path : Path
         File to write.
     """
-    columns = {"outcome": map(str, table.outcome)}
-    for name in sort_measures(table):
-        columns[name] = _format_numbers(table.measures[name].values, "{!r}")
-        columns[f"{name}_error"] = _format_numbers(table.measures[name].errors, "{:.6g}")
-    columns["message"] = (table.messages.get(number, "") for number in range(len(table)))
-    if case_folders:
-        columns["case"] = case_folders
-    # the rows are made one by one, because the cells of all cases would fill the memory
-    cells = enumerate(zip(*columns.values(), strict=True))
-    lines = ([*cases.texts(number), *row] for number, row in cells)
-    write_rows(path, chain([[*(axis.key for axis in cases.axes), *columns]], lines))
+    names = sort_measures(table)
+    measures = list(chain.from_iterable((name, f"{name}_error") for name in names))
+    header = [*(axis.key for axis in cases.axes), "outcome", *measures, "message"]
+    header += ["case"] * bool(case_folders)
+
+    def make_rows(part: slice) -> Iterator[tuple[str, ...]]:
+        """Return the rows of some cases."""
+        numbers = range(len(table))[part]
+        columns = []
+        for axis, indices in zip(cases.axes, cases.axis_indices(np.asarray(numbers))):
+            columns.append([axis.texts[index] for index in indices.tolist()])
+        columns.append(map(str, table.outcome[part]))
+        for column in map(table.measures.get, names):
+            columns.append(_format_numbers(column.values[part], "%r"))
+            columns.append(_format_numbers(column.errors[part], "%.6g"))
+        columns.append([table.messages.get(number, "") for number in numbers])
+        if case_folders:
+            columns.append(case_folders[part])
+        return zip(*columns, strict=True)
+
+    # The rows are made in parts, because the cells of all cases would fill the memory.
+    starts = range(0, len(table), N_ROWS_PER_PART)
+    parts = (make_rows(slice(start, start + N_ROWS_PER_PART)) for start in starts)
+    write_rows(path, chain([header], chain.from_iterable(parts)))
 
 
-def _format_numbers(numbers: np.ndarray, number_format: str) -> Iterator[str]:
-    """Yield numbers as strings; "" for NaN."""
-    for number in map(float, numbers):
-        yield "" if number != number else number_format.format(number)
+def _format_numbers(numbers: np.ndarray, number_format: str) -> list[str]:
+    """Return numbers as strings; "" for NaN."""
+    values = numbers.astype(float).tolist()
+    return ["" if value != value else number_format % value for value in values]
 
 
 def compute_in_memory(
@@ -288,6 +292,11 @@ def collect_shards(
         Whether report.html is written.
     """
     with Folder(target, cases.compute_hashes(sweep_scene)) as folder:
-        answer = write_tables(sweep_scene, cases, folder, page, is_collected=True)
+        n_missing = int(np.sum(~folder.find_stored_cases("none")))
+        if n_missing:
+            raise Missing(
+                f"{folder.shown}: {n_missing} of {len(cases)} cases have no answer; run their shards again, "
+                "or continue with --resume"
+            )
         folder.clean(removes_others=False)
-    return answer
+        return write_tables(sweep_scene, cases, folder, page, is_collected=True)

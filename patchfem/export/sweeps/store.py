@@ -2,8 +2,8 @@
 
 A file has the dimensions `measure` and `case`: `values` (float64), `errors` and `floors` (float32) in SI; `name`, a hash
 that identifies a case in any sweep of its scene; `outcome` as CF flags; and the attributes `measures` (JSON: unit of each
-measure) and `messages` (JSON: message of each failed case by its place in the file). A file that cannot be read holds no
-cases.
+measure), `messages` and `findings` (JSON: why a case failed, and why it did not settle or misses its tolerance, by its
+place in the file). A file that cannot be read holds no cases.
 """
 
 import json
@@ -18,6 +18,7 @@ from ..netcdf import read_netcdf, write_arrays
 
 CHUNKS_FOLDER = "chunks"
 CHUNK_FILE_ENDING = ".nc"
+MAX_SELECTED_CASES = 2**14  # cases of a file that are copied at the same time
 CHUNK_NUMBER_TYPES = {"values": np.float64, "errors": np.float32, "floors": np.float32}
 
 
@@ -44,7 +45,8 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
         data[part] = Variable(("measure", "case"), np.array(columns, kind), "")
     attributes = {
         "measures": json.dumps(results.units),
-        "messages": json.dumps(results.messages, ensure_ascii=False),
+        "messages": json.dumps(dict(results.messages), ensure_ascii=False),
+        "findings": json.dumps(dict(results.findings), ensure_ascii=False),
         "faults": json.dumps(results.faults, ensure_ascii=False),
     }
     path = folder / f"{int(names[0]):016x}-{int(names[-1]):016x}-{len(names)}{CHUNK_FILE_ENDING}"
@@ -61,8 +63,9 @@ def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
         words = [word.replace(" ", "_") for word in outcome.meanings]
         results = CaseResults(np.array(words, object)[outcome.values])
         results.units.update(json.loads(attributes["measures"]))
-        messages = json.loads(attributes["messages"])
-        results.messages.update({int(case): text for case, text in messages.items()})
+        for part in ("messages", "findings"):
+            texts = json.loads(attributes[part])
+            getattr(results, part).update({int(case): text for case, text in texts.items()})
         results.faults += json.loads(attributes["faults"])
         for part in CHUNK_NUMBER_TYPES if results.units else ():
             columns = zip(results.units, data[part].values, strict=True)
@@ -102,8 +105,9 @@ class Chunks:
             names, results = read_chunk(path)
             rows = self._find_rows(names)
             numbers = np.flatnonzero(rows >= 0)
-            if numbers.size:
-                yield numbers, results.select(rows[numbers])
+            for start in range(0, numbers.size, MAX_SELECTED_CASES):
+                part = numbers[start : start + MAX_SELECTED_CASES]
+                yield part, results.select(rows[part])
 
     def _find_rows(self, names: np.ndarray) -> np.ndarray:
         """Return the row (n,) of each requested case among the names (m,) of a file; -1 without one."""
@@ -121,29 +125,32 @@ class Chunks:
         files = self.list_files()[::-1]
         if len(files) < 2:
             return
-        chunks = [read_chunk(path) for path in files]
-        names = np.concatenate([chunk_names for chunk_names, _ in chunks])
+        names_by_file = [read_chunk(path)[0] for path in files]
+        names = np.concatenate(names_by_file)
         distinct, newest = np.unique(names, return_index=True)
         if removes_others:
             # Sorted, because the other method of NumPy 2.0 overflows for names of 64 bits.
             newest = newest[np.isin(distinct, self.distinct, kind="sort")]
 
-        # The rows that are kept of each chunk, from the newest file to the oldest one.
+        # The rows that are kept of each file, from the newest to the oldest one. The files are read one after the other, so
+        # that their results are in memory once.
         is_kept = np.zeros(names.size, bool)
         is_kept[newest] = True
-        ends = np.cumsum([chunk_names.size for chunk_names, _ in chunks])
-        parts = []
-        count = 0
-        for chunk_is_kept, (_, results) in zip(np.split(is_kept, ends[:-1]), chunks, strict=True):
-            rows = np.flatnonzero(chunk_is_kept)
-            if rows.size:
-                parts.append((count + np.arange(rows.size), results.select(rows)))
-                count += rows.size
+        ends = np.cumsum([own.size for own in names_by_file])
+
+        def iterate_parts() -> Iterator[tuple[np.ndarray, CaseResults]]:
+            """Yield the places of the kept cases of each file in the new one, and their results."""
+            count = 0
+            for path, part_is_kept in zip(files, np.split(is_kept, ends[:-1]), strict=True):
+                rows = np.flatnonzero(part_is_kept)
+                if rows.size:
+                    yield count + np.arange(rows.size), read_chunk(path)[1].select(rows)
+                    count += rows.size
 
         outdated = set(files)
-        if parts:
+        if newest.size:
             # the new file may have the name of an old one
-            results = join_case_results(count, parts)
+            results = join_case_results(newest.size, iterate_parts())
             outdated.discard(write_chunk(self.folder, names[is_kept], results))
         for path in outdated:
             path.unlink()

@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from ...campaigns.sweeps.changes import MAIN_MEASURES, SweepAnalysis
+from ...campaigns.sweeps.changes import MAIN_MEASURES, MeasureRange, SweepAnalysis
 from ...campaigns.sweeps.limits import DOUBLED_VALUE_CHANGE, KeyLimit
 from ...campaigns.sweeps.peaks import FREQUENCY_KEY, PeakOnLine
 from ...campaigns.sweeps.ranking import SobolIndex
 from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Outcome
 from ...response import rows
+from ...runs import refine
 from ..answer import Quantities, Quantity
 from ..quantities import format_quantity, format_value
 
@@ -37,7 +38,7 @@ def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
 
 
 def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
-    """Return the headline: the measure that changes most, by how much, and with which key."""
+    """Return the headline: the measure that changes most, by how much, and with which key, and how the main ones change."""
     counts = analysis.cases
     n_known = counts["count"] - counts["unfinished"] - counts["failed"]
     if n_known < 2:
@@ -48,24 +49,50 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     if not analysis.ranges:
         return f"No main measure of {n_known} cases changes by more than its error."
 
-    name, *cases, _ = analysis.ranges[0]
+    first, *others = analysis.ranges
+    clauses = [f"changes most: {_describe_range(table, analysis, first)}"]
+    for entry in others:
+        if refine.is_main(entry.measure):
+            words = _describe_range(table, analysis, entry)
+            clauses.append(f"{_name_in_words(entry.measure)} {words}")
+    changed = {entry.measure for entry in analysis.ranges}
+    for name in filter(refine.is_main, table.measures):
+        if name not in changed and np.isfinite(table.select_trusted(name)).any():
+            clauses.append(f"{_name_in_words(name)} by no more than its error")
+    text = f"{_name_in_words(first.measure)} {'; '.join(clauses)}."
+    varied = [key for key in table.keys if key.count > 1]
+    return f"With {varied[0].key}, {text}" if len(varied) == 1 else text[0].upper() + text[1:]
+
+
+def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRange) -> str:
+    """Return the smallest and the largest value of a measure, where they lie, and the extreme inside the range of the key.
+
+    With several keys, the largest total index of Sobol names the main one in place of where they lie.
+    """
+    name, *cases, _ = entry
     column = table.measures[name]
     round_off = VALUE_ROUND_OFF * np.nanmax(np.abs(column.values))
     ends = [0.0 if abs(column.values[case]) <= round_off else column.values[case] for case in cases]
     low, high = (_format_measure(name, column.unit, end) for end in ends)
     varied = [key for key in table.keys if key.count > 1]
-    if len(varied) == 1:
-        places = [format_value(varied[0].values[case], varied[0].unit) for case in cases]
-        return (
-            f"With {varied[0].key}, {_name_in_words(name)} changes most: from {low} at {places[0]} "
-            f"to {high} at {places[1]}."
-        )
+    if len(varied) != 1:
+        share = ""
+        for index in analysis.ranking.get(name, ())[:1]:
+            share = f", mainly with {index.key} (total index {index.total:.2f})"
+        return f"from {low} to {high}{share}"
 
-    # With several keys the largest total index of Sobol names the main one.
-    share = ""
-    for index in analysis.ranking.get(name, ())[:1]:
-        share = f", mainly with {index.key} (total index {index.total:.2f})"
-    return f"{_name_in_words(name).capitalize()} changes most: from {low} to {high}{share}."
+    places = [format_value(varied[0].values[case], varied[0].unit) for case in cases]
+    words = f"from {low} at {places[0]} to {high} at {places[1]}"
+    for extreme in analysis.extremes:
+        if extreme.measure == name:
+            numbers = (extreme.place, *extreme.interval, *extreme.band)
+            place, first, last, begin, end = (format_value(one, extreme.unit) for one in numbers)
+            value = _format_measure(name, column.unit, extreme.value)
+            words += (
+                f" ({'largest' if extreme.is_largest else 'smallest'}, {value}, at {place}, {first} to {last}; "
+                f"within 5 % of it from {begin} to {end})"
+            )
+    return words
 
 
 def _name_in_words(name: str) -> str:

@@ -104,7 +104,9 @@ def max_yield_displacement(force: float, stiffness: float, chi: float, beta: flo
     return force * (1 + beta) / (stiffness * (beta + (chi + 1) / (chi + 2)))
 
 
-def slider_cells(force: float, stiffness: float, chi: float, beta: float) -> Sliders:
+def slider_cells(
+    force: float, stiffness: float, chi: float, beta: float, n_cells: int = N_SLIDER_CELLS
+) -> Sliders:
     """Return sliders that represent the cells of the power law, followed by the slider that yields last.
 
     Each cell keeps the stiffness and the slip force of its part of the density, so the sums over all cells are exact, as
@@ -117,18 +119,20 @@ def slider_cells(force: float, stiffness: float, chi: float, beta: float) -> Sli
         Slip force F_S [N] and stiffness K_T [N/m].
     chi, beta : float
         Exponent > -1 of the micro-slip, and weight >= 0 of the last slider.
+    n_cells : int
+        Number of cells of the power law.
 
     Returns
     -------
     Sliders
     """
-    unit = _unit_sliders(chi, beta)
+    unit = _unit_sliders(chi, beta, n_cells)
     phi_max = max_yield_displacement(force, stiffness, chi, beta)
     return Sliders(stiffness * unit.stiffness, phi_max * unit.yield_displacement)
 
 
 @lru_cache(32)
-def _unit_sliders(chi: float, beta: float) -> Sliders:
+def _unit_sliders(chi: float, beta: float, n_cells: int) -> Sliders:
     """Return the `slider_cells` for a unit stiffness and phi_max = 1."""
     power_law_fraction = 1 / (1 + beta)
     log_min = np.log(MIN_SLIDER_RATIO)
@@ -138,7 +142,7 @@ def _unit_sliders(chi: float, beta: float) -> Sliders:
     x = np.concatenate([[0.0], np.exp(np.linspace(log_min, 0.0, 20 * N_SLIDER_CELLS + 1))])
     log_part = np.clip(1 - np.log(np.maximum(x, MIN_SLIDER_RATIO)) / log_min, 0.0, 1.0)
     cell_fraction = (1 - LOG_CELL_FRACTION) * x ** (1 + chi / 2) + LOG_CELL_FRACTION * log_part
-    edges = np.interp(np.linspace(0.0, 1.0, N_SLIDER_CELLS + 1), cell_fraction, x)
+    edges = np.interp(np.linspace(0.0, 1.0, n_cells + 1), cell_fraction, x)
 
     # Integrals of rho and of phi rho over each cell
     stiffness = power_law_fraction * np.diff(edges ** (chi + 1))

@@ -6,8 +6,7 @@ is computed by a single run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from time import process_time
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -19,13 +18,20 @@ from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds.parameters import Bonds
 from ...friction.record import make_law
 from ...model.model import Model
-from ...model.similar_models import collect_columns, select_models
-from ...points.case_rows import SAME_CASE_CYCLE, SAME_SMOOTH_CYCLE, Cases, Number
+from ...model.similar_models import SimilarModels, collect_columns, select_models
+from ...points.case_rows import (
+    MAX_STEP_PHASE,
+    MAX_STEPS,
+    SAME_CASE_CYCLE,
+    SAME_SMOOTH_CYCLE,
+    WINDOW_STEPS,
+    Cases,
+    Number,
+)
 from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
-from ...points.law_rows import Law
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
-from ...response.errors import MAX_CONVERGENCE_ORDER, convergence_errors, total_error
+from ...response.errors import ERROR_MEASURES, convergence_errors, total_error
 from ...response.outcome import (
     AMPLITUDE_ROUND_OFF,
     describe_ringing,
@@ -56,23 +62,20 @@ from ..results.notes import MAX_WORK_CHECK
 from ..results.result import shorten_file_names
 from ..rig.motion_warnings import note_on_creep
 from . import one_by_one
-from .case_results import CaseResults, has_unreadable_measurements
+from .case_results import CaseResults, CodedColumn, has_unreadable_measurements
 
 BATCH_ENGINE = "points"  # name of the engine in the settings of a case
 # Longest steps per cycle of successive marches of smooth laws
-BATCH_STEPS_PER_CYCLE = (24, 48, 96, 192, 384, 768)
-# Order of convergence of these marches: that of the steps is 4, that of extremes and instants between them is lower
-BATCH_ORDER = 3.0
-# The same of law "lugre": with 3, only 91 and 98 % of the errors of two sweeps held, with 2 they are 97 and 99 %
-LUGRE_ORDER = 2.0
+BATCH_STEPS_PER_CYCLE = (20, 40, 80, 160, 320, 640)
+BATCH_ORDER = 4.0  # order of convergence of these marches
+# Part of the mean square of the relative errors of a case that is added to the error of each of its measures
+POOLED_ERROR = 0.5
+# Measures whose error is not relative to their value
+UNPOOLED_MEASURES = {"drift_per_cycle", *ERROR_MEASURES}
 EXACT_STEPS_PER_CYCLE = 16  # steps of laws that are linear between events, which are exact
-# Error of the measures of exact steps relative to their values and to the terms of differences: twice the largest of
-# the random cases of a test
-EXACT_STEPS_ERROR = 5e-8
-# The same of measures that depend on the acceleration within a step, which is the rate of a polynomial
-POLYNOMIAL_ERROR = 1e-6
+# Relative error of the integral of the polynomial of order 5 in a step whose fastest vibration has a phase p, by p^6
+INTEGRAL_REMAINDER = 1 / 100_800
 DISTORTION = "acceleration_distortion"
-POLYNOMIAL_MEASURES = ("absolute_acceleration_peak", DISTORTION, "equivalent_stiffness")
 # Smallest distance of the drive from the frequencies of an undamped mode, relative to the squared frequency of the drive,
 # at which forced and free motion do not cancel to more than half the digits
 MIN_DETUNING = 1e-6
@@ -88,6 +91,7 @@ MAX_MICRO_DAMPING_RATIO = 4.0
 # Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
 MEASURE_CHANGE_ROUND_OFF = 1e-12
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
+CREEP_KEY = "friction.reference_speed"  # key on which the note on creep depends
 
 
 class Scales(NamedTuple):
@@ -227,13 +231,11 @@ def collect_cases(models: Sequence[Model]) -> tuple[Cases, Scales]:
     The second record has their tolerances and the reference quantities of their errors.
     """
     columns = collect_columns(models, _list_numbers)
-    first, second = len(Number), len(Number) + N_NUMBERS
-    memory = columns[second : -1 - len(Scales._fields)]
-    cases = Cases(
-        np.ascontiguousarray(columns[:first].T), np.ascontiguousarray(columns[first:second]),
-        np.ascontiguousarray(memory), columns[-1 - len(Scales._fields)],
-    )  # fmt: skip
-    return cases, Scales(*columns[-len(Scales._fields) :])
+    n_numbers, n_scales = len(Number), len(Scales._fields)
+    ends = [n_numbers, n_numbers + N_NUMBERS, -1 - n_scales, -n_scales]
+    parameters, numbers, memory, reference, scales = np.split(columns, ends)
+    law = np.ascontiguousarray(numbers), np.ascontiguousarray(memory)
+    return Cases(np.ascontiguousarray(parameters.T), *law, reference[0]), Scales(*scales)
 
 
 def _list_numbers(model: Model) -> tuple:
@@ -292,20 +294,20 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
     """
     remaining = np.arange(len(cases.parameters))
     if is_linear_between_events(cases):
-        remaining = np.flatnonzero(has_closed_form(cases))
+        remaining = np.flatnonzero(has_closed_form(cases, scales))
         if remaining.size:
             part = cases.select(remaining)
             march = march_cases(part, EXACT_STEPS_PER_CYCLE)
-            errors = estimate_exact_errors(part, march)
+            errors = estimate_exact_errors(part, _select(scales, remaining), march)
             is_met = np.ones(remaining.size, bool)
             yield remaining, Refined(march, errors, EXACT_STEPS_PER_CYCLE, is_met)
         return
 
     coarse = march_cases(cases, BATCH_STEPS_PER_CYCLE[0])
-    for fewer, count in pairwise(BATCH_STEPS_PER_CYCLE):
+    for count in BATCH_STEPS_PER_CYCLE[1:]:
         part_cases, part = cases.select(remaining), _select(scales, remaining)
         fine = march_cases(part_cases, count)
-        errors = estimate_errors(part_cases, fine.values, coarse.values, (count, fewer))
+        errors = estimate_errors(part_cases, fine.values, coarse.values, count)
         is_met = np.ones(remaining.size, bool)
         for name in fine.values.keys() - set(INTERNAL_VALUES):
             value = fine.values[name]
@@ -339,10 +341,18 @@ def find_repeat_error(cases: Cases, same: float) -> np.ndarray:
     return same / np.maximum(decrease, 1 / columns[Number.CYCLES])
 
 
+def find_size(name: str, values: dict[str, np.ndarray]) -> np.ndarray:
+    """Return the size (n,) of a measure, or of the terms if it is a difference, to which its error is relative.
+
+    `name` is that of the measure, and `values` (n,) are all measures of the cases by name.
+    """
+    return np.fmax(np.abs(values[name]), larger_term(name, values))
+
+
 def estimate_errors(
-    cases: Cases, fine: dict[str, np.ndarray], coarse: dict[str, np.ndarray], steps: tuple[int, int]
+    cases: Cases, fine: dict[str, np.ndarray], coarse: dict[str, np.ndarray], steps: int
 ) -> dict[str, np.ndarray]:
-    """Return the errors (n,) by name from the values of two marches.
+    """Return the errors (n,) by name from the values of a march and of one with half its steps.
 
     Parameters
     ----------
@@ -350,28 +360,30 @@ def estimate_errors(
         The n cases.
     fine, coarse : dict
         Values (n,) by name.
-    steps : (int, int)
-        Their numbers of steps per cycle.
+    steps : int
+        Steps per cycle of the first march.
     """
-    order = LUGRE_ORDER if cases.numbers[0, 0] == Law.LUGRE else BATCH_ORDER
-    repeat_error = find_repeat_error(cases, SAME_SMOOTH_CYCLE / steps[0] ** 3)
+    repeat_error = find_repeat_error(cases, SAME_SMOOTH_CYCLE / steps**3)
     with np.errstate(all="ignore"):
-        errors = convergence_errors(fine, coarse, ratio=steps[0] / steps[1], order=order)
+        errors = convergence_errors(fine, coarse, order=BATCH_ORDER)
+
         # A change that is small by accident does not give an error far below those of the other measures, relative to
         # the value of a measure or to the terms of a difference.
-        sizes = {name: np.fmax(np.abs(fine[name]), larger_term(name, fine)) for name in errors}
-        relative = np.array([errors[name] / sizes[name] for name in errors])
-        is_change = (relative > MEASURE_CHANGE_ROUND_OFF) & (relative < 1)
-        relative = np.where(is_change, relative, np.nan)
-        relative[:, ~is_change.any(axis=0)] = 0.0
-        typical = np.nanmedian(relative, axis=0) / 2**MAX_CONVERGENCE_ORDER
+        names = errors.keys() - UNPOOLED_MEASURES
+        sizes = {name: find_size(name, fine) for name in names}
+        parts = np.array([errors[name] / sizes[name] for name in names])
+        is_changed = parts > MEASURE_CHANGE_ROUND_OFF
+        squares = np.where(is_changed & (parts < 1), parts, 0.0) ** 2
+        mean = squares.sum(axis=0) / np.fmax(np.sign(squares).sum(axis=0), 1)
+        pooled = POOLED_ERROR * np.sqrt(mean)
+        added = dict(zip(names, pooled * is_changed))
         for name, error in errors.items():
-            least = typical * sizes[name] * (error > MEASURE_CHANGE_ROUND_OFF * sizes[name])
-            errors[name] = total_error(name, fine, [np.fmax(error, least)], repeat_error)
+            terms = [error, added[name] * sizes[name]] if name in added else [error]
+            errors[name] = total_error(name, fine, terms, repeat_error)
     return errors
 
 
-def estimate_exact_errors(cases: Cases, march: CaseMarch) -> dict[str, np.ndarray]:
+def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dict[str, np.ndarray]:
     """Return the errors (n,) by name of the measures of a march by exact steps.
 
     The work of a motion that repeats may be wrong by the error of the motion times the work that the largest force does
@@ -380,12 +392,15 @@ def estimate_exact_errors(cases: Cases, march: CaseMarch) -> dict[str, np.ndarra
     """
     values = march.values
     repeat_error = find_repeat_error(cases, SAME_CASE_CYCLE)
+    drive_phase, phase = find_step_phases(cases, scales)
     errors = {}
-    for name, value in values.items():
-        size = np.fmax(np.abs(value), larger_term(name, values))
-        relative = POLYNOMIAL_ERROR if name in POLYNOMIAL_MEASURES else EXACT_STEPS_ERROR
-        if name == DISTORTION:  # a ratio of harmonics, which have this error
+    for name in values:
+        size = find_size(name, values)
+        relative = INTEGRAL_REMAINDER * phase**6
+        if name == DISTORTION:
+            # The acceleration of the third harmonic is 9 omega^2 times a slide that has three times the phase.
             size = np.fmax(size, 1.0)
+            relative = relative + 9 * INTEGRAL_REMAINDER * (3 * drive_phase) ** 6
         errors[name] = total_error(name, values, [relative * size], repeat_error)
 
     slide = values[AMPLITUDE] / np.abs(cases.parameters[:, Number.OUTPUT])
@@ -400,19 +415,41 @@ def estimate_exact_errors(cases: Cases, march: CaseMarch) -> dict[str, np.ndarra
     return errors
 
 
-def has_closed_form(cases: Cases) -> np.ndarray:
-    """Return a mask (n,) of the cases whose mode vibrates, and that have a forced motion."""
+def find_step_phases(cases: Cases, scales: Scales) -> tuple[np.ndarray, np.ndarray]:
+    """Return the phases (n,) [rad] of the drive and of the fastest vibration in an exact step of the window.
+
+    Parameters
+    ----------
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Stiffnesses of the cases during stick.
+    """
+    columns = cases.parameters.T
+    stiffness = columns[Number.STIFFNESS] + columns[Number.MOBILITY] * scales.stick_stiffness
+    ratio = np.fmax(np.sqrt(stiffness) / columns[Number.OMEGA], 1.0)
+    n_steps = np.clip(2 * np.pi * ratio / MAX_STEP_PHASE, EXACT_STEPS_PER_CYCLE, MAX_STEPS)
+    drive = 2 * np.pi / (n_steps * WINDOW_STEPS)
+    return drive, drive * ratio
+
+
+def has_closed_form(cases: Cases, scales: Scales) -> np.ndarray:
+    """Return a mask (n,) of the cases whose mode vibrates, and that have a forced motion.
+
+    Parameters
+    ----------
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Stiffnesses of the cases during stick.
+    """
     columns = cases.parameters.T
     damping = columns[Number.DAMPING]
     square = columns[Number.OMEGA] ** 2
     has = columns[Number.STIFFNESS] > damping**2 / 4
-    added = columns[Number.MOBILITY] * columns[Number.LOAD] * cases.numbers[1]
-    added = np.divide(
-        added, cases.numbers[2], where=cases.numbers[0] != 0, out=np.zeros_like(added)
-    )
-    for stiffness in (columns[Number.STIFFNESS], columns[Number.STIFFNESS] + added):
-        detuning = np.hypot(stiffness - square, damping * columns[Number.OMEGA])
-        has &= detuning > MIN_DETUNING * square
+    for added in (0.0, columns[Number.MOBILITY] * scales.stick_stiffness):
+        detuning = columns[Number.STIFFNESS] + added - square
+        has &= np.hypot(detuning, damping * columns[Number.OMEGA]) > MIN_DETUNING * square
     return has
 
 
@@ -482,7 +519,6 @@ def make_results(
         results.warnings[case] = [describe_ringing(ratio, limits, refined.march.extremes.shape[1])]
 
     # The steady amplitude is a measure if the motion still changes.
-    is_transient = results.outcome == str(Outcome.TRANSIENT)
     with np.errstate(invalid="ignore"):
         values[STEADY_AMPLITUDE], errors[STEADY_AMPLITUDE] = select_reported(
             steady, results.outcome, values[AMPLITUDE], errors[AMPLITUDE], scales.tolerance
@@ -499,47 +535,49 @@ def make_results(
             results.errors[name] = np.where(is_known & ~grows, errors[name], np.nan)
             results.floors[name] = np.where(is_known, find_floor(name, values, scales), np.nan)
 
-    unresolved = np.flatnonzero(is_transient & np.isnan(values[STEADY_AMPLITUDE]))
-    _put_reason(results, STEADY_AMPLITUDE, unresolved, CHANGE_NOT_RESOLVED_REASON)
+    is_unresolved = np.isnan(values[STEADY_AMPLITUDE])
+    is_unresolved &= results.outcome == str(Outcome.TRANSIENT)
+    _put_reason(results, STEADY_AMPLITUDE, is_unresolved, CHANGE_NOT_RESOLVED_REASON)
 
     # The secant stiffness of a rigid stick is infinite at a reversal.
     first = models[0]
     if first.sticks_rigidly:
-        sticks = (
-            values["stick_fraction"]
-            > MOTION_TABLE["stick_fraction"].floor + errors["stick_fraction"]
-        )
-        moves = values[AMPLITUDE] > 0
-        _put_reason(
-            results, SECANT_STIFFNESS, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
-        )
+        least = MOTION_TABLE["stick_fraction"].floor + errors["stick_fraction"]
+        is_infinite = (values["stick_fraction"] > least) & (values[AMPLITUDE] > 0)
+        _put_reason(results, SECANT_STIFFNESS, is_infinite, STICKS_AT_REVERSAL_REASON)
 
-    # Measures that a case lacks get the reasons that a single run states.
+    # Measures that a case lacks get the reasons that a single run states. They are the same for cases that lack the same
+    # measures and stick alike.
     drive = first.rig.drive.signal
     last_cycles = SimpleNamespace(time=np.array([0.0, window * drive.period]), extra={})
-    for case in range(len(results)):
-        known = {
-            name: column[case] for name, column in results.values.items() if results.has(name, case)
-        }
-        for name, measure in find_missing(known, last_cycles, drive, True).items():
-            results.fill(case, {name: measure})
-    numerics = {"engine": BATCH_ENGINE, "steps_per_cycle": refined.steps, "window_cycles": window}
-    results.numerics.update(dict.fromkeys(range(len(results)), numerics))
+    sticking = values["stick_fraction"]
+    patterns = np.vstack([results.find_known(), sticking == 1, sticking > 0])
+    _, firsts, places = np.unique(patterns, axis=1, return_index=True, return_inverse=True)
+    for pattern, case in enumerate(firsts):
+        names = [name for name in results.values if results.has(name, case)]
+        known = {name: results.values[name][case] for name in names}
+        alike = np.flatnonzero(places.ravel() == pattern)
+        results.fill(alike, find_missing(known, last_cycles, drive, True))
+    results.numerics[:] = {
+        "engine": BATCH_ENGINE,
+        "steps_per_cycle": refined.steps,
+        "window_cycles": window,
+    }
     return results
 
 
-def _put_reason(results: CaseResults, name: str, cases: np.ndarray, reason: str) -> None:
+def _put_reason(results: CaseResults, name: str, is_missing: np.ndarray, reason: str) -> None:
     """Replace values of a measure by the reason why they are missing.
 
-    `name` is that of the measure, and `cases` are the indices of the cases. `results` is changed.
+    `name` is that of the measure, and `is_missing` (n,) is a mask of the cases. `results` is changed.
     """
-    if not cases.size:
+    if not is_missing.any():
         return
     results.add_measure(name, MOTION_TABLE[name].unit)
     for column in (results.values[name], results.errors[name]):
-        column[cases] = np.nan
-    results.floors[name][cases] = MOTION_TABLE[name].floor
-    results.reasons.setdefault(name, {}).update(dict.fromkeys(cases.tolist(), reason))
+        column[is_missing] = np.nan
+    results.floors[name][is_missing] = MOTION_TABLE[name].floor
+    results.reasons.setdefault(name, CodedColumn(len(results)))[is_missing] = reason
 
 
 def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
@@ -630,8 +668,7 @@ def needs_single_run(
     results : CaseResults
         Results of the march.
     """
-    march = refined.march
-    values = march.values
+    values = refined.march.values
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
     is_alone |= scales.may_create > 0
     is_alone |= ~(scales.limit > 0) | (scales.acceleration == 0)
@@ -642,15 +679,24 @@ def needs_single_run(
 
 
 def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
-    """Store the warnings and notes that follow from the models alone in `results`, by case."""
+    """Store the warnings and notes that follow from the models alone in `results`, by case.
+
+    Similar models have them in common, except for a note on creep with the speed of each case.
+    """
     creeps = law_has_trait(models[0].friction.law, "creeps")
-    for case, model in enumerate(models):
+    groups: Iterable[tuple] = enumerate(models)
+    if isinstance(models, SimilarModels):
+        has_own_notes = creeps and CREEP_KEY in models.plain_numbers.limits
+        groups = groups if has_own_notes else [(slice(None), models.first)]
+
+    own_warnings = dict(results.warnings)
+    for cases, model in groups:
         texts = [*model.source.remarks, *model.rig.structure.notes]
-        if warnings := [
-            *shorten_file_names(texts, model.source.path),
-            *results.warnings.get(case, ()),
-        ]:
-            results.warnings[case] = warnings
         notes = [*model.source.notes, *(note_on_creep(model.friction) if creeps else ())]
+        if texts:
+            results.warnings[cases] = shorten_file_names(texts, model.source.path)
         if notes:
-            results.notes[case] = notes
+            results.notes[cases] = notes
+    for case, texts in own_warnings.items():
+        shared = results.warnings[case]
+        results.warnings[case] = shared if shared == texts else [*shared, *texts]

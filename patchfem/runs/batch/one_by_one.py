@@ -10,7 +10,7 @@ from time import process_time
 
 import numpy as np
 
-from ...core import PatchfemError
+from ...core import Outcome, PatchfemError
 from ...model.model import Model
 from ...model.similar_models import select_models
 from ..plan import plan
@@ -24,10 +24,9 @@ NO_MEMORY_MESSAGE = "not enough memory; make contact.element_size larger, or mak
 
 
 def solve(
-    models: Sequence[Model],
+    models: Sequence[Model | PatchfemError],
     report: Callable | None = None,
     on_result: Callable | None = None,
-    estimate: bool = True,
 ) -> CaseResults:
     """Compute the case results of models by single runs, one after the other.
 
@@ -35,20 +34,20 @@ def solve(
 
     Parameters
     ----------
-    models : sequence of Model
-        Models in the order of the results.
+    models : sequence of Model or PatchfemError
+        Models in the order of the results, or errors in place of models that could not be built.
     report : callable, optional
         Callback for progress messages.
     on_result : callable, optional
         Called with the case index and the Result after each run.
-    estimate : bool
-        If False, coarse runs and error estimates are omitted.
     """
     results = CaseResults.blank(len(models))
     for case, model in enumerate(models):
         begin = process_time()
         try:
-            result = run(plan(model), report, estimate=estimate)
+            if isinstance(model, PatchfemError):
+                raise model
+            result = run(plan(model), report)
             if on_result is not None:
                 on_result(case, result)
         except FAILED_CASE_ERRORS as error:
@@ -59,6 +58,11 @@ def solve(
         else:
             results.put(case, result.outcome, result.measures, 0.0)
             results.numerics[case] = collect_used_settings(result)
+            findings = [finding.sentence for finding in result.findings]
+            if result.outcome is Outcome.NOT_CONVERGED:
+                findings = result.warnings
+            if findings:
+                results.findings[case] = " ".join(findings)
             if result.warnings:
                 results.warnings[case] = list(result.warnings)
             if result.notes:

@@ -7,7 +7,9 @@ small tolerance contain those for a large one. `mesh_levels` decides how many gr
 `plan` predicts their number. Read `make_base_grids` first, then `make_column_layout`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from typing import NamedTuple
 
@@ -19,9 +21,9 @@ from ...mesh.grid import TensorGrid
 from ...model.patch import PatchModel
 from ...model.pieces import extend_grid, find_rounded_edges
 from . import slip_zones, store
-from .condensed import condense
-from .press import Patch, solve_patch_contact
-from .values import contact_ends
+from .condensed import CondensedPair, condense
+from .press import Patch, PressedCases, solve_patch_contact
+from .values import contact_ends, find_contact_edges
 
 # Number of equal columns of the grid on which the search for the contact starts.
 N_SEARCH_COLUMNS = 96
@@ -150,13 +152,22 @@ def make_base_grids(patch_model) -> BaseGrids:
 
     def search() -> BaseGrids:
         """Search for the contact region, and grade the grids to it."""
-        layout, contact = search_layout([patch_model])
+        layout, contact = search_layout(patch_model, partial(find_contacts_alone, [patch_model]))
         return BaseGrids(make_grids(patch_model, layout), contact)
 
     return store.get_or_compute(key, search)
 
 
-def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None]:
+class SolvedContact(NamedTuple):
+    """Contact regions of a patch in a search: its PatchModel, and the regions under its loads."""
+
+    model: PatchModel
+    extents: list[ContactExtent]
+
+
+def search_layout(
+    patch_model, find_contacts: Callable[[CondensedPair], list[SolvedContact]]
+) -> tuple[Layout, ContactExtent | None]:
     """Search for the contact regions of patches of equal geometry on grids that are graded towards the previous result.
 
     The contact is solved on a coarse grid, and the columns of the next grid are short at the edges of this
@@ -169,8 +180,10 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
 
     Parameters
     ----------
-    cases : list of PatchModel
-        A single patch, or the cases of a sweep, of which those without a solution are left out.
+    patch_model : PatchModel
+        Pieces and mesh settings of all patches.
+    find_contacts : callable
+        Function of the pieces on a grid that returns the contacts for which the next grid is graded; [] without a load.
 
     Returns
     -------
@@ -179,31 +192,20 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
     contact : ContactExtent or None
         Contact region of the first solved case; None without a load or a solution.
     """
-    first = cases[0]
-    layout = make_search_layout(first)
+    layout = make_search_layout(patch_model)
     contact = None
     for _ in range(MAX_CONTACT_SEARCHES):
-        pair = condense(first, *make_grids(first, layout))
-        solved = []
-        for case in cases:
-            # The single run of a case reports its error.
-            try:
-                extents = _find_contact_extents(case, pair)
-            except PatchfemError:
-                if len(cases) == 1:
-                    raise
-                continue
-            if extents:
-                solved.append((case, extents))
+        pair = condense(patch_model, *make_grids(patch_model, layout), keep_factors=False)
+        solved = find_contacts(pair)
 
         # Without a load there is no contact to search for.
         if not solved:
             break
-        contact = solved[0][1][0]
-        layout = _merge_layouts([make_column_layout(case, extents) for case, extents in solved])
+        contact = solved[0].extents[0]
+        layout = _merge_layouts([make_column_layout(*one) for one in solved])
 
         # The search ends when this grid has resolved all contacts.
-        max_ratio = 1 / (choose_density(first).n_edge_cells - 1)
+        max_ratio = 1 / (choose_density(patch_model).n_edge_cells - 1)
         is_resolved = True
         for case, extents in solved:
             edge_cell_ratio = max(extent.cell / extent.width for extent in extents)
@@ -214,12 +216,41 @@ def search_layout(cases: list[PatchModel]) -> tuple[Layout, ContactExtent | None
     return layout, contact
 
 
-def _find_contact_extents(patch_model, pair) -> list[ContactExtent]:
-    """Return the contact regions of a patch under its load and at the ends of its range; [] without a load."""
-    if not patch_model.nominal_load > 0:
-        return []
-    loaded_models = (patch_model, *make_load_variants(patch_model))
-    return [find_contact_extent(solve_patch_contact(model, pair)) for model in loaded_models]
+def find_contacts_alone(patch_models: list[PatchModel], pair: CondensedPair) -> list[SolvedContact]:
+    """Return the contact regions of patches under their loads and at the ends of their ranges.
+
+    Patches without a load are left out, and those without a solution, unless there is only one.
+
+    Parameters
+    ----------
+    patch_models : list of PatchModel
+        Patches of equal geometry.
+    pair : CondensedPair
+        Their pieces on a grid.
+    """
+    solved = []
+    for patch_model in patch_models:
+        if not patch_model.nominal_load > 0:
+            continue
+        try:
+            loaded_models = (patch_model, *make_load_variants(patch_model))
+            patches = [solve_patch_contact(model, pair) for model in loaded_models]
+        # The single run of a case reports its error.
+        except PatchfemError:
+            if len(patch_models) == 1:
+                raise
+            continue
+        solved.append(SolvedContact(patch_model, list(map(_find_patch_extent, patches))))
+    return solved
+
+
+def _find_patch_extent(patch: Patch) -> ContactExtent:
+    """Return the contact region of a patch, with the zones that slip under its prescribed slide."""
+    slip = patch.model.mesh.slip
+    extent = find_contact_extent(patch.pressed, 0)
+    if slip is None or not np.isfinite(extent.cell):
+        return extent
+    return replace(extent, slip_zones=slip_zones.find_slip_zones(patch, slip, contact_ends(patch)))
 
 
 def make_load_variants(patch_model) -> list[PatchModel]:
@@ -394,19 +425,25 @@ def _min_coating_thickness(patch_model) -> float:
     return min(filter(None, thicknesses), default=np.inf)
 
 
-def find_contact_extent(patch: Patch) -> ContactExtent:
-    """Return the contact region of a patch on a coarse grid, or without contact the cells around its smallest gap.
+def find_contact_extent(pressed: PressedCases, case: int) -> ContactExtent:
+    """Return the contact region of a case on a coarse grid, or without contact the cells around its smallest gap.
 
     A smooth asperity layer carries pressure everywhere, so that only pressures above a thousandth
     of the peak count.
+
+    Parameters
+    ----------
+    pressed : PressedCases
+        Cases on the grid.
+    case : int
+        Number of the case.
     """
-    x = patch.x
-    sigma = patch.pressure.sigma_n
-    strips = patch.state.pressure
-    is_loaded = strips > (1e-3 * strips.max() if patch.has_smooth_skin else 0.0)
+    x = pressed.x
+    strips = pressed.pressure[case]
+    is_loaded = strips > (1e-3 * strips.max() if pressed.level.is_smooth else 0.0)
     loaded_nodes = np.flatnonzero(is_loaded.any(axis=0))
     if not loaded_nodes.size:
-        loaded_nodes = np.array([np.argmin(patch.pressure.gap)])
+        loaded_nodes = np.array([np.argmin(pressed.gap[case].min(axis=0))])
     low = x[max(loaded_nodes[0] - 1, 0)]
     high = x[min(loaded_nodes[-1] + 1, x.size - 1)]
 
@@ -419,11 +456,11 @@ def find_contact_extent(patch: Patch) -> ContactExtent:
     edge_cells = np.flatnonzero((is_loaded[:, 1:] != is_loaded[:, :-1]).any(axis=0))
     edge_positions = (x[edge_cells] + x[edge_cells + 1]) / 2
     cells = np.diff(x)[edge_cells]
-    edges = contact_ends(patch)
-    if len(edges) == edge_cells.size:
-        edge_positions = np.array([end.position for end in edges])
+    if pressed.active[case].any():
+        edges = find_contact_edges(pressed).list_edges(case)
+        if len(edges) == edge_cells.size:
+            edge_positions = np.array([end.position for end in edges])
 
-    slip = patch.model.mesh.slip
     corners = tuple(float(x[at]) for at in (0, -1) if is_loaded[:, at].any())
     low = edge_positions[0] if loaded_nodes[0] else x[0]
     high = edge_positions[-1] if loaded_nodes[-1] < x.size - 1 else x[-1]
@@ -432,8 +469,7 @@ def find_contact_extent(patch: Patch) -> ContactExtent:
         tuple(edge_positions.tolist()),
         corners,
         float(cells.max(initial=0.0)),
-        _find_pressure_maxima(x, sigma),
-        slip_zones.find_slip_zones(patch, slip, edges) if slip is not None else (),
+        _find_pressure_maxima(x, pressed.mean_pressure[case]),
     )
 
 

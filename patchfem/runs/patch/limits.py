@@ -4,8 +4,9 @@ In: values on two or more meshes, each with cells half as long as those of the p
 `Limit` with the error of the value on the finest mesh and of the extrapolated value.
 """
 
-from math import inf
 from typing import NamedTuple
+
+import numpy as np
 
 # Upper bound of the ratio of successive changes in the extrapolation; it is about that of second
 # order.
@@ -27,7 +28,7 @@ IRREGULAR_SERIES_ERROR_FACTOR = 2.0  # Ratio of error to the largest change for 
 
 
 class Limit(NamedTuple):
-    """Limit of a series of values on nested meshes, with error estimates.
+    """Limits of series of values on nested meshes, with error estimates; arrays of the shape of the values of one mesh.
 
     - value: value on the finest mesh.
     - error: half-width of an interval around `value` that contains the limit.
@@ -35,10 +36,10 @@ class Limit(NamedTuple):
     - extrapolated_error: half-width of the interval around `extrapolated`.
     """
 
-    value: float
-    error: float
-    extrapolated: float
-    extrapolated_error: float
+    value: np.ndarray
+    error: np.ndarray
+    extrapolated: np.ndarray
+    extrapolated_error: np.ndarray
 
 
 def extrapolate_to_zero_cell_length(
@@ -60,8 +61,8 @@ def extrapolate_to_zero_cell_length(
 
     Parameters
     ----------
-    values : sequence of float
-        Values from the coarsest to the finest mesh, two or more.
+    values : (l, ...) array_like
+        Values from the coarsest to the finest of l >= 2 meshes.
     nested : bool
         Whether each mesh halves the cells of the previous one.
     has_same_gap : bool
@@ -71,41 +72,50 @@ def extrapolate_to_zero_cell_length(
     -------
     Limit
     """
+    values = np.asarray(values, float)
     finest = values[-1]
     last_change = finest - values[-2]
-    previous_change = values[-2] - values[-3] if len(values) > 2 else 0.0
-    last_size = abs(last_change)
-    previous_size = abs(previous_change)
-    ratio = inf if previous_change >= 0 else -inf
-    if last_change != 0:
-        ratio = previous_change / last_change
+    previous_change = values[-2] - values[-3] if len(values) > 2 else np.zeros_like(finest)
+    last_size = np.abs(last_change)
+    previous_size = np.abs(previous_change)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(last_change != 0, previous_change / last_change, np.inf)
+    ratio = np.where((last_change == 0) & (previous_change < 0), -np.inf, ratio)
 
     # Irregular series, and those of two values, are not extrapolated.
-    if not nested or not MIN_CONVERGING_RATIO_OF_CHANGES <= ratio <= MAX_REGULAR_RATIO_OF_CHANGES:
-        largest_change = max(last_size, previous_size / MAX_RATIO_OF_CHANGES)
-        if not nested and len(values) > 2:
-            bounded_ratio = min(max(ratio, MIN_RATIO_OF_CHANGES), MAX_RATIO_OF_CHANGES_NOT_NESTED)
-            largest_change = max(last_size, previous_size / MAX_RATIO_OF_CHANGES_NOT_NESTED)
-            largest_change = largest_change / (bounded_ratio - 1)
-        elif ratio > MAX_REGULAR_RATIO_OF_CHANGES:
-            largest_change = max(
-                last_size / (MAX_RATIO_OF_CHANGES - 1), previous_size / MAX_RATIO_OF_CHANGES**2 * 2
-            )
-        error = IRREGULAR_SERIES_ERROR_FACTOR * largest_change
-        return Limit(finest, error, finest, error)
+    largest_change = np.maximum(last_size, previous_size / MAX_RATIO_OF_CHANGES)
+    if nested:
+        by_chance = np.maximum(
+            last_size / (MAX_RATIO_OF_CHANGES - 1), previous_size / MAX_RATIO_OF_CHANGES**2 * 2
+        )
+        largest_change = np.where(ratio > MAX_REGULAR_RATIO_OF_CHANGES, by_chance, largest_change)
+    elif len(values) > 2:
+        bounded_ratio = np.clip(ratio, MIN_RATIO_OF_CHANGES, MAX_RATIO_OF_CHANGES_NOT_NESTED)
+        largest_change = np.maximum(last_size, previous_size / MAX_RATIO_OF_CHANGES_NOT_NESTED)
+        largest_change = largest_change / (bounded_ratio - 1)
+    irregular_error = IRREGULAR_SERIES_ERROR_FACTOR * largest_change
+    is_regular = (ratio >= MIN_CONVERGING_RATIO_OF_CHANGES) & (
+        ratio <= MAX_REGULAR_RATIO_OF_CHANGES
+    )
+    if not (nested and is_regular.any()):
+        return Limit(finest, irregular_error, finest, irregular_error)
 
     # The error of the extrapolated value is its change due to the last refinement, but at least a
     # quarter of the remainder.
-    remainder = last_change / (min(max(ratio, MIN_RATIO_OF_CHANGES), MAX_RATIO_OF_CHANGES) - 1)
-    extrapolated = finest + remainder
-    extrapolated_error = abs(remainder) / (4 if ratio >= MIN_EXPECTED_RATIO_OF_CHANGES else 2)
+    remainder = last_change / (np.clip(ratio, MIN_RATIO_OF_CHANGES, MAX_RATIO_OF_CHANGES) - 1)
+    extrapolated = np.where(is_regular, finest + remainder, finest)
+    size = np.abs(remainder)
+    extrapolated_error = size / np.where(ratio >= MIN_EXPECTED_RATIO_OF_CHANGES, 4, 2)
     if len(values) < 4:
         extrapolated_error = 2 * extrapolated_error
     else:
-        change = abs(extrapolated - extrapolate_to_zero_cell_length(values[:-1]).extrapolated)
-        extrapolated_error = max(extrapolated_error, change)
+        before = extrapolate_to_zero_cell_length(values[-4:-1]).extrapolated
+        extrapolated_error = np.maximum(extrapolated_error, np.abs(extrapolated - before))
     if not has_same_gap:
-        extrapolated_error = max(extrapolated_error, abs(remainder))
+        extrapolated_error = np.maximum(extrapolated_error, size)
     return Limit(
-        finest, REGULAR_SERIES_ERROR_FACTOR * abs(remainder), extrapolated, extrapolated_error
+        finest,
+        np.where(is_regular, REGULAR_SERIES_ERROR_FACTOR * size, irregular_error),
+        extrapolated,
+        np.where(is_regular, extrapolated_error, irregular_error),
     )

@@ -7,7 +7,7 @@ module also estimates the model error due to the plane state.
 """
 
 from dataclasses import replace
-from itertools import pairwise, takewhile
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -21,16 +21,17 @@ from ..results.patch_rows import (
     FINEST_MESH_SOURCE,
     MESH_MEASURES,
     PATCH_TABLE,
+    Arrays,
     Measures,
     Values,
     make_measure,
 )
-from .condensed import condense_once
+from .condensed import CondensedPair, condense_once
 from .limits import extrapolate_to_zero_cell_length
-from .press import Patch, Patches, solve_patch_contact
+from .press import Patch, Patches, PressedCases, solve_patch_contact
 from .values import (
     compute_static_values,
-    edge_cell_lengths,
+    compute_values,
     open_rounded_length,
     unresolved_edge_rounding_pressure,
 )
@@ -61,10 +62,108 @@ MEASURES_BETWEEN_PLANE_STATES = ("pressure_peak", "normal_stiffness", "tangentia
 PRESSURE_PEAK_MEASURES = ("pressure_peak", "loaded_fraction")
 
 
+class MeshValues(NamedTuple):
+    """What the error estimate needs of n cases on one mesh.
+
+    - pair: condensed pieces of the mesh.
+    - values {name: (n,)}: static measures in SI units.
+    - n_intervals (n,): number of separate intervals in contact.
+    - end_pressure (n,): larger one of the pressures [Pa] at the ends of the interface.
+    """
+
+    pair: CondensedPair
+    values: Arrays
+    n_intervals: np.ndarray
+    end_pressure: np.ndarray
+
+    def take(self, rows) -> "MeshValues":
+        """Return selected cases; `rows` are indices or a mask (n,)."""
+        values = {name: column[rows] for name, column in self.values.items()}
+        return MeshValues(self.pair, values, self.n_intervals[rows], self.end_pressure[rows])
+
+
+def collect_mesh_values(pressed: PressedCases) -> MeshValues:
+    """Return what the error estimate needs of pressed cases."""
+    active = pressed.active
+    begins = active & np.diff(active, axis=1, prepend=False)
+    end_pressure = pressed.mean_pressure[:, [0, -1]].max(axis=1)
+    return MeshValues(
+        pressed.level.pair, compute_values(pressed), np.count_nonzero(begins, axis=1), end_pressure
+    )
+
+
+class StaticEstimates(NamedTuple):
+    """Static measures of n cases with their errors, as arrays (k, n) of k measures in SI units.
+
+    - names: names of the measures.
+    - values, errors: a value is NaN where the pressure is unbounded; an error is NaN without a coarser mesh, and 0 without
+      load.
+    - is_limit (k, n): whether the value is extrapolated to vanishing cells.
+    - reasons: {reason: mask (n,) of the cases whose pressure is unbounded for this reason}.
+    """
+
+    names: tuple[str, ...]
+    values: np.ndarray
+    errors: np.ndarray
+    is_limit: np.ndarray
+    reasons: Arrays
+
+    def make_measures(self, case: int) -> Measures:
+        """Return the measures of one case by name."""
+        out = {}
+        reason = next((text for text, mask in self.reasons.items() if mask[case]), "")
+        for name, value, error, is_limit in zip(
+            self.names, self.values[:, case], self.errors[:, case], self.is_limit[:, case]
+        ):
+            source = EXTRAPOLATED_SOURCE if is_limit else FINEST_MESH_SOURCE
+            out[name] = make_measure(name, value, None if np.isnan(error) else error, source)
+            if reason and name in PRESSURE_PEAK_MEASURES:
+                out[name] = replace(out[name], value=None, error=None, reason=reason)
+        return out
+
+    def floors(self, tolerance: float, length: float) -> np.ndarray:
+        """Return the absolute errors (k, n) that are allowed at any tolerance.
+
+        The floor of a measure that is a difference of larger terms is at least the tolerance times these terms: rotation
+        times half the length for the approach, half the length for the centre of pressure, and load times half the length
+        for the moment.
+
+        Parameters
+        ----------
+        tolerance : float
+            Relative tolerance; 0 raises no floor.
+        length : float
+            Length [m] of the interface.
+        """
+        floors = np.zeros(self.values.shape) + [[PATCH_TABLE[name].floor] for name in self.names]
+        arm = tolerance * length / 2
+        row = self.names.index
+        larger_terms = {
+            "approach": np.abs(self.values[row("rotation")]) * arm,
+            "pressure_centre": arm,
+            "moment": self.values[row("normal_load")] * arm,
+        }
+        for name, size in larger_terms.items():
+            floors[row(name)] = np.maximum(floors[row(name)], size)
+        return floors
+
+    def excess(self, tolerance: float, length: float) -> np.ndarray:
+        """Return the largest ratios (n,) of error to allowed error of the measures that control the mesh.
+
+        Measures without value or error do not count. `tolerance` is relative, and `length` [m] that of the interface.
+        """
+        rows = [self.names.index(name) for name in MESH_MEASURES]
+        allowed = compute_allowed_error(tolerance, self.values, self.floors(tolerance, length))[
+            rows
+        ]
+        ratios = self.errors[rows] / np.maximum(allowed, 1e-300)
+        return np.nan_to_num(ratios).max(axis=0)
+
+
 def estimate_static_measures(
-    fine: Patch, *coarse: Patch | None, tolerance: float | None = None
-) -> Measures:
-    """Return the static measures of a patch with their error estimates.
+    fine: PressedCases, series: list[MeshValues], tolerance: float | None = None
+) -> StaticEstimates:
+    """Return the static measures of pressed cases with their error estimates.
 
     A value is that of the finest mesh, or its limit for vanishing cells if the value misses the
     tolerance and the limit is more accurate (`limits`). The error is the larger one of the change
@@ -78,58 +177,58 @@ def estimate_static_measures(
 
     Parameters
     ----------
-    fine : Patch
-        The patch on its finest mesh.
-    *coarse : Patch or None
-        The patch on coarser meshes, from fine to coarse; None where there is no such mesh.
+    fine : PressedCases
+        n cases on their finest mesh.
+    series : list of MeshValues
+        The same cases on all meshes from coarse to fine, the last one that of `fine`.
     tolerance : float or None
         Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
 
     Returns
     -------
-    dict
-        Measure by name. The error is None without a coarser mesh, and 0 without a load.
+    StaticEstimates
     """
-    finest = compute_static_values(fine)
-    coarse = _select_meshes_with_same_contact_intervals(
-        fine, [patch for patch in coarse if patch is not None]
-    )
+    finest = series[-1].values
+    names = tuple(finest)
+    n_meshes = _count_meshes_with_same_intervals(fine, series)
+    missed_peak = unresolved_edge_rounding_pressure(fine)
+    hidden_errors = estimate_hidden_errors(_compute_resolution(fine, missed_peak), finest)
+    factor = np.where(missed_peak > 0, UNRESOLVED_ROUNDING_ERROR_FACTOR, 1.0)
+    values = np.array(list(finest.values()))
+    errors = np.full(values.shape, np.nan if len(series) == 1 else 0.0)
+    is_limit = np.zeros(values.shape, bool)
 
-    # The series over the meshes gives a value, its limit and their errors.
-    if coarse and finest["normal_load"] > 0:
-        missed_peak = unresolved_edge_rounding_pressure(fine)
-        out = extrapolate_static_measures(
-            [*(compute_static_values(patch) for patch in reversed(coarse)), finest],
-            estimate_hidden_errors(_compute_resolution(fine, missed_peak), finest),
+    # Cases with the same number of usable meshes form one series; without load there are no errors.
+    for count in np.unique(n_meshes) if len(series) > 1 else ():
+        rows = (n_meshes == count) & (finest["normal_load"] > 0)
+        if not rows.any():
+            continue
+        used = series[-count:]
+        part = extrapolate_static_values(
+            [mesh.take(rows).values for mesh in used],
+            {name: error[rows] for name, error in hidden_errors.items()},
             tolerance,
-            all(are_cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *coarse))),
-            max(MIN_REPORTED_RELATIVE_ERROR, fine.pair.round_off_error),
-            UNRESOLVED_ROUNDING_ERROR_FACTOR if missed_peak else 1.0,
-            has_same_gap=fine.model.gap.profile is None,
+            max(MIN_REPORTED_RELATIVE_ERROR, fine.level.pair.round_off_error),
+            factor[rows],
+            nested=all(are_cells_halved(b.pair, a.pair) for a, b in pairwise(used)),
+            has_same_gap=fine.level.model.gap.profile is None,
         )
-    else:
-        error = 0.0 if coarse else None
-        out = {}
-        for name, value in finest.items():
-            out[name] = make_measure(name, value, error, FINEST_MESH_SOURCE)
+        values[:, rows] = part.values
+        errors[:, rows] = part.errors
+        is_limit[:, rows] = part.is_limit
 
-    # Errors and reasons that no series over meshes shows.
-    if coarse and fine.averaging is not None:
-        out |= _widen_errors_by_corner_pressure(out, fine, coarse[0])
-    if fine.points is not None:
-        out |= _select_more_accurate_measures(out, fine.points.measures)
-    reason = _reason_for_unbounded_pressure(fine)
-    for name in PRESSURE_PEAK_MEASURES if reason else ():
-        out[name] = replace(out[name], value=None, error=None, reason=reason)
-    return out
+    estimates = StaticEstimates(names, values, errors, is_limit, _find_unbounded_pressure(fine))
+    if len(series) > 1 and fine.level.model.gap.profile is not None:
+        _widen_errors_by_end_pressure(estimates, *series[-2:])
+    for mask in estimates.reasons.values():
+        for name in PRESSURE_PEAK_MEASURES:
+            values[names.index(name), mask] = np.nan
+            errors[names.index(name), mask] = np.nan
+    return estimates
 
 
 def with_static_measures(patches, tolerance: float | None, points=None) -> Patches:
     """Return solved patches of which the finest one has its static measures with their errors.
-
-    The floor of the error of a measure that is a difference of larger terms is at least the tolerance times these terms:
-    rotation times half the length for the approach, half the length for the centre of pressure, and load times half the
-    length for the moment.
 
     Parameters
     ----------
@@ -148,18 +247,23 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> Patch
     fine, *coarse = patches
     if points is not None:
         fine = replace(fine, points=points, averaging=points.spacing)
-    used_tolerance = tolerance if fine.model.mesh.is_automatic else None
-    measures = estimate_static_measures(fine, *coarse, tolerance=used_tolerance)
+    meshes = [patch.pressed for patch in (fine, *coarse) if patch is not None]
+    estimates = estimate_static_measures(
+        fine.pressed,
+        [collect_mesh_values(pressed) for pressed in reversed(meshes)],
+        tolerance if fine.model.mesh.is_automatic else None,
+    )
+    measures = estimates.make_measures(0)
+    if points is not None:
+        measures |= _select_more_accurate_measures(measures, points.measures)
 
-    arm = fine.model.pieces.length / 2
-    larger_terms = {
-        "approach": abs(measures["rotation"].value) * arm,
-        "pressure_centre": arm,
-        "moment": measures["normal_load"].value * arm,
-    }
-    for name, size in larger_terms.items():
-        floor = max(measures[name].floor, (tolerance or 0.0) * size)
-        measures[name] = replace(measures[name], floor=floor)
+    # The floors follow from the values of the points, if these are more accurate
+    chosen = [[np.nan if one.value is None else one.value] for one in measures.values()]
+    floors = estimates._replace(values=np.array(chosen)).floors(
+        tolerance or 0.0, fine.model.pieces.length
+    )
+    for (name, measure), floor in zip(measures.items(), floors[:, 0]):
+        measures[name] = replace(measure, floor=float(floor))
     return replace(fine, measures=measures), *coarse
 
 
@@ -167,11 +271,14 @@ def _select_more_accurate_measures(by_mesh: Measures, by_points: Measures) -> Me
     """Return those measures by name that the points of a profile determine more accurately than the mesh.
 
     `by_mesh` and `by_points` are the measures of both solutions. Peak measures are compared by their relative errors: a
-    mesh that smooths the profile has a low peak pressure, and therefore a small absolute error.
+    mesh that smooths the profile has a low peak pressure, and therefore a small absolute error. An unbounded pressure has no
+    value on the points either.
     """
     out = {}
     for name, measure in by_points.items():
         other = by_mesh[name]
+        if other.value is None:
+            continue
         ratio = 1.0
         if name in PRESSURE_PEAK_MEASURES and measure.value and other.value:
             ratio = other.value / measure.value
@@ -180,79 +287,62 @@ def _select_more_accurate_measures(by_mesh: Measures, by_points: Measures) -> Me
     return out
 
 
-def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list[Patch]) -> list[Patch]:
-    """Select the coarser solutions with as many contact intervals as the finest one.
+def _count_meshes_with_same_intervals(fine: PressedCases, series: list[MeshValues]) -> np.ndarray:
+    """Return how many of the last meshes (n,) have as many contact intervals as the finest one.
 
     A short contact interval beside a step may be missing on a coarse mesh. The change to this mesh
     then says nothing about the order of convergence, so that this mesh and all coarser ones are
-    left out.
+    left out. The change to one coarser mesh is always used.
 
     Parameters
     ----------
-    fine : Patch
-        The patch on its finest mesh.
-    coarse : list of Patch
-        From fine to coarse.
-
-    Returns
-    -------
-    list of Patch
-        At least one solution; if it is the only one, its change determines the error.
+    fine : PressedCases
+        n cases on their finest mesh.
+    series : list of MeshValues
+        The same cases on all meshes from coarse to fine.
     """
-    if not fine.model.gap.step_edges:
-        return coarse
-    n_intervals = _count_contact_intervals(fine.active)
-    selected = takewhile(
-        lambda patch: _count_contact_intervals(patch.active) == n_intervals, coarse
-    )
-    return list(selected) or coarse[:1]
+    if not fine.level.model.gap.step_edges:
+        return np.full(len(fine), len(series))
+    counts = np.array([mesh.n_intervals for mesh in reversed(series)])
+    n_same = np.logical_and.accumulate(counts == counts[0]).sum(axis=0)
+    return np.maximum(n_same, min(2, len(series)))
 
 
-def _count_contact_intervals(active) -> int:
-    """Return the number of separate parts of the interface that are in contact, from the contact set (m,) of its nodes."""
-    return int(np.count_nonzero(active & np.diff(active, prepend=False)))
-
-
-def _widen_errors_by_corner_pressure(
-    measures_by_name: Measures, fine: Patch, coarse: Patch
-) -> Measures:
-    """Increase the errors of the peak measures if the pressure at a corner still grows.
+def _widen_errors_by_end_pressure(
+    estimates: StaticEstimates, coarse: MeshValues, fine: MeshValues
+) -> None:
+    """Increase the errors of the peak measures if the pressure at a corner still grows, in place.
 
     At a corner that the profile just reaches, every refinement raises the pressure, although the
     largest pressure of the patch may not change yet.
 
     Parameters
     ----------
-    measures_by_name : dict of str to Measure
-        Measures of the patch, with the errors found so far.
-    fine, coarse : Patch
-        Patch on the finest mesh, and on the mesh before it.
-
-    Returns
-    -------
-    dict of str to Measure
-        The peak measures with larger errors; {} if their errors are large enough already.
+    estimates : StaticEstimates
+        Measures of the cases, with the errors found so far.
+    coarse, fine : MeshValues
+        The cases on the last two meshes.
     """
-    pressure = fine.pressure.sigma_n[[0, -1]].max()
-    coarse_pressure = coarse.pressure.sigma_n[[0, -1]].max()
-    peak, fraction = (measures_by_name[name] for name in PRESSURE_PEAK_MEASURES)
-    error = pressure + CORNER_PRESSURE_RISE_FACTOR * abs(pressure - coarse_pressure) - peak.value
-    if not pressure or error <= peak.error:
-        return {}
-    peak = replace(peak, error=float(error))
-    return dict(zip(PRESSURE_PEAK_MEASURES, (peak, widen_fraction_error(peak, fraction))))
+    peak, fraction = (estimates.names.index(name) for name in PRESSURE_PEAK_MEASURES)
+    pressure = fine.end_pressure
+    growth = np.abs(pressure - coarse.end_pressure)
+    error = pressure + CORNER_PRESSURE_RISE_FACTOR * growth - estimates.values[peak]
+    grows = (pressure > 0) & (error > estimates.errors[peak])
+    estimates.errors[peak, grows] = error[grows]
+    widened = compute_fraction_error(estimates, peak, fraction)
+    estimates.errors[fraction, grows] = widened[grows]
 
 
-def extrapolate_static_measures(
-    values_by_mesh: list[Values],
-    hidden_errors: Values,
+def extrapolate_static_values(
+    values_by_mesh: "list[Arrays] | list[Values]",
+    hidden_errors: "Arrays | Values",
     tolerance: float | None,
-    nested: bool = True,
     min_relative_error: float = MIN_REPORTED_RELATIVE_ERROR,
-    error_factor: float = 1.0,
+    error_factor: float | np.ndarray = 1.0,
     *,
+    nested: bool = True,
     has_same_gap: bool = True,
-) -> Measures:
+) -> StaticEstimates:
     """Extrapolate static measures over a sequence of refined meshes, with error estimates.
 
     The error of a value is the larger one of `error_factor` times the error of the series (`limits`) and
@@ -261,51 +351,92 @@ def extrapolate_static_measures(
     Parameters
     ----------
     values_by_mesh : list of dict
-        Values on two meshes or more by name, coarse to fine.
+        Values (n,) or numbers on two meshes or more by name, coarse to fine.
     hidden_errors : dict
         Errors by name that no refinement shows (`estimate_hidden_errors`).
     tolerance : float or None
         Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
-    nested : bool
-        Whether every mesh halves the cells of the previous one.
     min_relative_error : float
         Lower bound of the relative errors.
-    error_factor : float
+    error_factor : float or (n,) ndarray
         Factor on all errors.
+    nested : bool
+        Whether every mesh halves the cells of the previous one.
     has_same_gap : bool
         Whether the gap is the same on all meshes, which that of a measured profile is not.
+
+    Returns
+    -------
+    StaticEstimates
+    """
+    names = tuple(values_by_mesh[-1])
+    by_mesh = np.array([[np.atleast_1d(mesh[name]) for name in names] for mesh in values_by_mesh])
+    limit = extrapolate_to_zero_cell_length(by_mesh, nested, has_same_gap=has_same_gap)
+    none = np.zeros(by_mesh.shape[2])
+    hidden = np.array([hidden_errors.get(name, none) + none for name in names])
+
+    # The limit replaces the value only if it is needed and has the smaller error.
+    finest = limit.value
+    errors = np.maximum(error_factor * limit.error, hidden)
+    is_limit = np.zeros(finest.shape, bool)
+    if tolerance is not None:
+        floors = np.array([[PATCH_TABLE[name].floor] for name in names])
+        is_limit = (limit.extrapolated != finest) & (
+            errors > compute_allowed_error(tolerance, finest, floors)
+        )
+        limit_errors = np.maximum(
+            error_factor * limit.extrapolated_error, HIDDEN_ERROR_EXTRAPOLATION_FACTOR * hidden
+        )
+        is_limit &= limit_errors < errors
+        errors = np.where(is_limit, limit_errors, errors)
+    values = np.where(is_limit, limit.extrapolated, finest)
+    errors = np.maximum(errors, min_relative_error * np.abs(finest))
+
+    estimates = StaticEstimates(names, values, errors, is_limit, {})
+    if PRESSURE_PEAK_MEASURES[0] in names:
+        peak, fraction = (names.index(name) for name in PRESSURE_PEAK_MEASURES)
+        errors[fraction] = compute_fraction_error(estimates, peak, fraction)
+    return estimates
+
+
+def compute_fraction_error(estimates: StaticEstimates, peak: int, fraction: int) -> np.ndarray:
+    """Return errors (n,) of the loaded fraction that are at least those due to the peak pressure.
+
+    The loaded fraction is the mean pressure divided by the peak pressure, so that both have the same
+    relative error.
+
+    Parameters
+    ----------
+    estimates : StaticEstimates
+        Measures with their errors so far.
+    peak, fraction : int
+        Rows of the peak pressure and of the loaded fraction.
+    """
+    values = estimates.values
+    pressure = np.where(values[peak] > 0, values[peak], np.inf)
+    relative = estimates.errors[peak] / pressure
+    error = values[fraction] * relative / (1 - np.minimum(relative, 0.5))
+    return np.maximum(estimates.errors[fraction], error)
+
+
+def extrapolate_static_measures(values_by_mesh, hidden_errors, tolerance) -> Measures:
+    """Return the measures of a single case from its values on two meshes or more (`extrapolate_static_values`).
+
+    Parameters
+    ----------
+    values_by_mesh : list of dict
+        Numbers by name, coarse to fine.
+    hidden_errors : dict
+        Errors by name that no refinement shows.
+    tolerance : float or None
+        Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
 
     Returns
     -------
     dict
         Measure by name.
     """
-    out = {}
-    for name, finest in values_by_mesh[-1].items():
-        series = [values[name] for values in values_by_mesh]
-        limit = extrapolate_to_zero_cell_length(series, nested, has_same_gap=has_same_gap)
-        hidden = hidden_errors.get(name, 0.0)
-
-        # The limit replaces the value only if it is needed and has the smaller error.
-        value = finest
-        error = max(error_factor * limit.error, hidden)
-        allowed = np.inf
-        if tolerance is not None:
-            allowed = compute_allowed_error(tolerance, finest, PATCH_TABLE[name].floor)
-        if limit.extrapolated != finest and error > allowed:
-            extrapolated_error = max(
-                error_factor * limit.extrapolated_error, HIDDEN_ERROR_EXTRAPOLATION_FACTOR * hidden
-            )
-            if extrapolated_error < error:
-                value = limit.extrapolated
-                error = extrapolated_error
-
-        error = max(error, min_relative_error * abs(finest))
-        engine = FINEST_MESH_SOURCE if value == finest else EXTRAPOLATED_SOURCE
-        out[name] = make_measure(name, value, error, engine)
-
-    out["loaded_fraction"] = widen_fraction_error(*(out[name] for name in PRESSURE_PEAK_MEASURES))
-    return out
+    return extrapolate_static_values(values_by_mesh, hidden_errors, tolerance).make_measures(0)
 
 
 def widen_fraction_error(peak: Measure, fraction: Measure) -> Measure:
@@ -328,27 +459,38 @@ def max_mesh_error_ratio(measures_by_name: Measures, tolerance: float) -> float:
     return max(measures_by_name[name].error_ratio(tolerance) for name in MESH_MEASURES)
 
 
-def _reason_for_unbounded_pressure(patch: Patch) -> str:
-    """Return why the peak pressure of a patch diverges under mesh refinement, or "" if it does not.
+def list_unbounded_pressure_reasons(patch_model) -> list[str]:
+    """Return why the peak pressure of a patch may diverge under mesh refinement; [] if it cannot.
 
     A contact that ends at the edge of a step has the pressure singularity of a flat punch; a
     contact that extends over a closed step has a stronger one. An asperity layer (skin) bounds the
-    pressure.
+    pressure. A reason due to the ends of the interface comes first, then one for each step.
     """
-    if patch.has_skin:
-        return ""
-    x = patch.x
-    cells = np.diff(x)
-    is_loaded = patch.active
-    if patch.model.has_singular_ends and is_loaded[[0, -1]].any():
-        return (
+    reasons = []
+    if patch_model.interface.skin is not None:
+        return reasons
+    if patch_model.has_singular_ends:
+        reasons.append(
             "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
         )
-    for jump in patch.model.gap.step_edges:
+    for jump in patch_model.gap.step_edges:
+        reasons.append(
+            f"unbounded, because the contact reaches a sharp corner, the edge of the step at {jump:.4g} m"
+        )
+    return reasons
+
+
+def _find_unbounded_pressure(pressed: PressedCases) -> dict[str, np.ndarray]:
+    """Return the cases (n,) whose peak pressure diverges under mesh refinement, as masks by reason."""
+    patch_model = pressed.level.model
+    x = pressed.x
+    cells = np.diff(x)
+    is_loaded = pressed.is_loaded.any(axis=1)
+    masks = [is_loaded[:, [0, -1]].any(axis=1)] if patch_model.has_singular_ends else []
+    for jump in patch_model.gap.step_edges:
         cell = cells[np.clip(np.searchsorted(x, jump), 1, cells.size) - 1]
-        if is_loaded[np.abs(x - jump) <= 1.5 * cell].any():
-            return f"unbounded, because the contact reaches a sharp corner, the edge of the step at {jump:.4g} m"
-    return ""
+        masks.append(is_loaded[:, np.abs(x - jump) <= 1.5 * cell].any(axis=1))
+    return dict(zip(list_unbounded_pressure_reasons(patch_model), masks))
 
 
 def are_cells_halved(fine, coarse) -> bool:
@@ -363,7 +505,7 @@ def are_cells_halved(fine, coarse) -> bool:
 
 
 class Resolution(NamedTuple):
-    """Resolution of a contact by its mesh, from which hidden discretization errors follow.
+    """Resolution of n contacts by a mesh, from which hidden discretization errors follow; numbers or arrays (n,).
 
     - length: length of the interface [m].
     - n_nodes: nodes in contact.
@@ -380,69 +522,75 @@ class Resolution(NamedTuple):
     """
 
     length: float
-    n_nodes: int
-    longest_cell: float
-    edge_cells: float
-    edge_offset: float
-    can_rotate: bool
-    closing: float
-    corner_pressure: float = 0.0
-    wedge_pressure: float = 0.0
-    rounding_pressure: float = 0.0
-    open_ends: float = 0.0
-    inner_cells: float = 0.0
+    n_nodes: np.ndarray
+    longest_cell: np.ndarray
+    edge_cells: np.ndarray
+    edge_offset: np.ndarray | None
+    can_rotate: np.ndarray
+    closing: np.ndarray
+    corner_pressure: np.ndarray | float = 0.0
+    wedge_pressure: np.ndarray | float = 0.0
+    rounding_pressure: np.ndarray | float = 0.0
+    open_ends: np.ndarray | float = 0.0
+    inner_cells: np.ndarray | float = 0.0
 
 
-def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
-    """Return how well the mesh of a solved patch resolves its contact.
+def _compute_resolution(pressed: PressedCases, missed_peak) -> Resolution:
+    """Return how well the mesh resolves the contact of pressed cases.
 
-    `missed_peak` is the measure `unresolved_edge_rounding_pressure` [Pa].
+    `missed_peak` (n,) is the measure `unresolved_edge_rounding_pressure` [Pa].
     """
-    pair = patch.pair
-    pieces = patch.pieces
-    active = patch.active
-    interface = pieces.interface
-    sigma = patch.pressure.sigma_n
+    level = pressed.level
+    pair = level.pair
+    holder = pressed.holder
+    active = pressed.active
 
-    all_cells = np.diff(interface.x)
-    cells = edge_cell_lengths(patch.x, active)
-    longest_cell = float(cells.max(initial=0.0))
-    corner_pressure = 0.0
-    if pieces is pair.compliance:  # An asperity layer (skin) bounds the pressure.
+    # Cells in which the contact ends; those beside the outermost contact nodes are not between intervals
+    all_cells = np.diff(pressed.x)
+    cells = np.where(active[:, 1:] != active[:, :-1], all_cells, 0.0)
+    edge_cells = cells.sum(axis=1)
+    longest_cell = cells.max(axis=1)
+    is_inner = np.logical_or.accumulate(active, axis=1)[:, :-1]
+    is_inner &= np.logical_or.accumulate(active[:, ::-1], axis=1)[:, ::-1][:, 1:]
+
+    corner_pressure = np.zeros(len(pressed))
+    if not level.has_layer:  # An asperity layer (skin) bounds the pressure.
         # The free end of a coating raises the pressure in a layer as long as the coating is thick.
         # Cells longer than this layer do not resolve it; for shorter cells the missed pressure falls
         # with the square of their length.
         thicknesses = [grid.coating_thickness for grid in (pair.grid, pair.upper_grid)]
         thinnest = min((thickness for thickness in thicknesses if thickness > 0), default=np.inf)
         fraction = np.minimum(1.0, (all_cells[[0, -1]] / thinnest) ** 2)
-        corner_pressure = float((MISSED_CORNER_PRESSURE_FRACTION * sigma[[0, -1]] * fraction).max())
+        end_pressure = pressed.mean_pressure[:, [0, -1]]
+        corner_pressure = (MISSED_CORNER_PRESSURE_FRACTION * end_pressure * fraction).max(axis=1)
 
-    first, last = ~active[[0, -1]]
-    n_nodes = max(int(active.sum()), 1)
+    # The elastic displacement is the gap under load less that of rigid pieces in the same position
+    rigid = pressed.unloaded_gap - holder.approach[:, None, None]
+    rigid = rigid + holder.turn[:, None, None] * pressed.x
+    displacement = np.abs(pressed.gap - rigid).max(axis=(1, 2))
 
-    is_unresolved = n_nodes <= MAX_UNRESOLVED_CONTACT_NODES and cells.any()
+    n_nodes = np.maximum(active.sum(axis=1), 1)
+    is_unresolved = (n_nodes <= MAX_UNRESOLVED_CONTACT_NODES) & (edge_cells > 0)
     edge_offset = None
-    if not patch.has_smooth_skin:
+    if not level.is_smooth:
         edge_offset = _contact_edge_position_error(pair, longest_cell)
     return Resolution(
-        length=interface.length,
+        length=level.pair.compliance.interface.length,
         n_nodes=n_nodes,
         longest_cell=longest_cell,
-        edge_cells=float(cells.sum()),
+        edge_cells=edge_cells,
         edge_offset=edge_offset,
-        can_rotate="moment_balance" in patch.pressure.residuals,
-        closing=float(
-            np.ptp(patch.unloaded_gap) + np.abs(pieces.normal @ (sigma * interface.weight)).max()
-        ),
+        can_rotate=holder.can_rotate,
+        closing=np.ptp(pressed.unloaded_gap, axis=(1, 2)) + displacement,
         corner_pressure=corner_pressure,
-        wedge_pressure=_wedge_indentation_pressure(patch) if is_unresolved else 0.0,
+        wedge_pressure=np.where(is_unresolved, _wedge_indentation_pressure(pressed), 0.0),
         rounding_pressure=missed_peak,
-        open_ends=float(open_rounded_length(patch)),
-        inner_cells=float(cells[int(first) : cells.size - int(last)].sum()),
+        open_ends=open_rounded_length(pressed),
+        inner_cells=np.where(is_inner, cells, 0.0).sum(axis=1),
     )
 
 
-def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
+def estimate_hidden_errors(resolution: Resolution, finest: "Arrays | Values") -> "Arrays | Values":
     """Estimate the errors of the static measures that mesh refinement does not reveal.
 
     They are due to a contact of few nodes, to a coating thinner than the cells at a loaded corner,
@@ -455,12 +603,12 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
     resolution : Resolution
         Resolution of the finest mesh.
     finest : dict
-        Values on the finest mesh by name.
+        Values on the finest mesh by name; numbers or arrays (n,).
 
     Returns
     -------
     dict
-        Error by name.
+        Error by name; numbers or arrays (n,).
     """
     length = resolution.length
     n_nodes = resolution.n_nodes
@@ -469,26 +617,26 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
 
     # Errors add up over the edges of the contact: half of all their cells, but at least the longest one. The centre of a
     # resolved contact is far more accurate than its edges, because their position errors are alike.
-    cell = max(resolution.longest_cell, resolution.edge_cells / 2)
+    cell = np.maximum(resolution.longest_cell, resolution.edge_cells / 2)
     is_unresolved = n_nodes <= MAX_UNRESOLVED_CONTACT_NODES
-    centre_error = cell / (2 * n_nodes**2) if is_unresolved else 1e-3 * cell
+    centre_error = np.where(is_unresolved, cell / (2 * n_nodes**2), 1e-3 * cell)
 
-    peak_error = resolution.corner_pressure
-    if cell > 0 and n_nodes <= MIN_RESOLVED_CONTACT_NODES:
-        peak_error = peak_error + peak / (4 * n_nodes**2)
-    peak_error = max(peak_error, resolution.wedge_pressure, resolution.rounding_pressure - peak)
+    has_few_nodes = (cell > 0) & (n_nodes <= MIN_RESOLVED_CONTACT_NODES)
+    peak_error = resolution.corner_pressure + np.where(has_few_nodes, peak / (4 * n_nodes**2), 0.0)
+    peak_error = np.maximum(peak_error, resolution.wedge_pressure)
+    peak_error = np.maximum(peak_error, resolution.rounding_pressure - peak)
 
     # A nodal displacement has the round-off of its terms, and an error of the centre times the angle of rotation. A
     # prescribed rotation has neither error.
-    displacement = CONTACT_SOLUTION_ROUND_OFF * (abs(finest["approach"]) + resolution.closing)
-    displacement += abs(finest["rotation"]) * centre_error
-    fraction_per_pressure = finest["loaded_fraction"] / peak if peak else 0.0
+    displacement = CONTACT_SOLUTION_ROUND_OFF * (np.abs(finest["approach"]) + resolution.closing)
+    displacement = displacement + np.abs(finest["rotation"]) * centre_error
+    fraction_per_pressure = finest["loaded_fraction"] / np.where(peak > 0, peak, np.inf)
 
     edge_offset = 0.0
     if resolution.edge_offset is not None:
         # In a contact of few nodes, an edge may lie anywhere in its cell.
-        min_offset = 1.0 if is_unresolved else 1 / n_nodes**2
-        edge_offset = max(resolution.edge_offset, min_offset)
+        min_offset = np.where(is_unresolved, 1.0, 1 / n_nodes**2)
+        edge_offset = np.maximum(resolution.edge_offset, min_offset)
     outer_cells = resolution.edge_cells - resolution.inner_cells
     length_error = edge_offset * resolution.edge_cells + resolution.open_ends
     width_error = edge_offset * outer_cells + resolution.open_ends
@@ -506,59 +654,68 @@ def estimate_hidden_errors(resolution: Resolution, finest: Values) -> Values:
     }
 
 
-def _contact_edge_position_error(pair, cell):
-    """Return the position error of a contact edge between two nodes, in cell lengths.
+def _contact_edge_position_error(pair: CondensedPair, cell) -> np.ndarray:
+    """Return the position errors (n,) of a contact edge between two nodes, in cell lengths.
 
     A soft coating thinner than the cells acts as a Winkler foundation, whose contact ends where the
-    nodal pressure vanishes. cell: longest cell in which the contact ends [m].
+    nodal pressure vanishes. `cell` (n,) [m] is the longest cell in which the contact ends.
     """
     # The first row of a mesh file has no single height, on which the offset of an edge depends.
-    out = MIN_CONTACT_EDGE_ERROR_IN_CELLS if isinstance(pair.grid, TensorGrid) else 0.1
+    min_error = MIN_CONTACT_EDGE_ERROR_IN_CELLS if isinstance(pair.grid, TensorGrid) else 0.1
+    out = np.full(cell.shape, min_error)
     for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
         if grid.coating_thickness > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             contrast = 1 - min(ratio, 1 / ratio)
-            cells = min(1.0, cell / grid.coating_thickness)
-            out = max(out, edges.compute_edge_offset(cells, cells, 0.0) * contrast)
+            cells = np.minimum(1.0, cell / grid.coating_thickness)
+            out = np.maximum(out, edges.compute_edge_offset(cells, cells, 0.0) * contrast)
     return out
 
 
-def _wedge_indentation_pressure(patch: Patch) -> float:
-    """Return the largest pressure [Pa] compatible with the slope of the gap beside the contact.
+def _wedge_indentation_pressure(pressed: PressedCases) -> np.ndarray:
+    """Return the largest pressures (n,) [Pa] compatible with the slope of the gap beside each contact.
 
     It is E* times the slope, as for the indentation by a wedge, and is used for contacts of few
     nodes.
     """
-    ends = np.flatnonzero(patch.active[1:] != patch.active[:-1])
-    slopes = np.abs(np.diff(patch.unloaded_gap)) / np.diff(patch.x)
+    active = pressed.active
+    is_end = active[:, 1:] != active[:, :-1]
+    slopes = np.abs(np.diff(pressed.unloaded_gap)).max(axis=1) / np.diff(pressed.x)
     flexibility = 0
-    for piece in (patch.pair.piece, patch.pair.upper):
+    for piece in (pressed.level.pair.piece, pressed.level.pair.upper):
         young, nu = max(piece.layers.coating, piece.layers.substrate)
         flexibility += (1 - nu**2) / young
-    return float(slopes[..., ends].max() / flexibility)
+    return np.where(is_end, slopes, 0.0).max(axis=1) / flexibility
+
+
+def describe_assumed_plane_state(pieces) -> str:
+    """Describe the assumption of plane strain or plane stress for the `PatchPieces` of a patch; "" if it is beyond doubt.
+
+    It is for a piece in plane strain that is far wider than tall, and for one in plane stress that is far taller than wide.
+    """
+    ratio = pieces.width / pieces.height
+    if pieces.plane == "strain":
+        is_certain = ratio >= MIN_PLANE_STRAIN_WIDTH_RATIO
+    else:
+        is_certain = ratio <= 1 / MIN_PLANE_STRAIN_WIDTH_RATIO
+    if is_certain:
+        return ""
+    return (
+        f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall; "
+        "the true state lies between plane strain and plane stress"
+    )
 
 
 def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
     """Return a list with a note on the model error due to assuming plane strain or plane stress.
 
-    The list is empty for a piece in plane strain that is far wider than tall, and for one in plane
-    stress that is far taller than wide. No mesh refinement reduces this error.
+    The list is empty if the state is beyond doubt. No mesh refinement reduces this error.
     """
     pieces = patch_model.pieces
-    ratio = pieces.width / pieces.height
-    if pieces.plane == "strain":
-        other_plane = "stress"
-        is_certain = ratio >= MIN_PLANE_STRAIN_WIDTH_RATIO
-    else:
-        other_plane = "strain"
-        is_certain = ratio <= 1 / MIN_PLANE_STRAIN_WIDTH_RATIO
-    if is_certain:
+    assumption = describe_assumed_plane_state(pieces)
+    if not assumption:
         return []
-
-    assumption = (
-        f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall; "
-        "the true state lies between plane strain and plane stress"
-    )
+    other_plane = "stress" if pieces.plane == "strain" else "strain"
 
     # The change between the two plane states bounds the error, because the true state lies between
     # them.

@@ -204,7 +204,8 @@ def solve_on_refined_meshes(
             if coarse is not None:
                 coarse.pair.forget_factors()
             try:
-                keeps = not is_too_expensive(patch_model, meshes)
+                keeps = number >= MIN_NESTED_MESHES - 1
+                keeps &= not is_too_expensive(patch_model, meshes)
                 pair = condense(patch_model, *meshes, keep_factors=keeps)
                 patch = solve_patch_contact(patch_model, pair, coarse=coarse)
             # The cells are too short for double precision, so that the finest mesh is left out.

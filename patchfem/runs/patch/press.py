@@ -1,12 +1,14 @@
 """Static contact problem of a patch: condensed pieces, gap, and load or approach.
 
-In: a `PatchModel` and its condensed pieces (`CondensedPair`). Out: a `Patch` with pressure, gap and
-compliance.
+In: a `PatchModel` and its condensed pieces (`CondensedPair`). Out: `PressedCases`, the forces and gaps of n cases at the
+nodes, and `Patch`, the view of one of them with pressure, gap and compliance.
 """
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from time import process_time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,15 +17,20 @@ from ...contact.press import (
     Holder,
     StripLayout,
     StripModel,
+    StripProperties,
     StripsState,
     press_strips,
     split_into_strips,
 )
+from ...contact.press_cases import press_on_table
+from ...contact.set_table import SetTable
 from ...contact.strip_compliance import StripCompliance
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
+from ...elasticity.lapack import use_one_blas_thread
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchModel
 from ..results.patch_rows import Arrays, Measures, Values
+from .cases import Cases, make_cases, make_gap_shapes
 from .condensed import CondensedPair
 from .skin import make_skin_law
 
@@ -63,6 +70,187 @@ class PointSolution(NamedTuple):
         return float(self.surface.x[1] - self.surface.x[0])
 
 
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Pieces of a group of cases on one mesh, with the asperity layer and the contact sets that the cases share.
+
+    - model: PatchModel of the group; its load and the numbers of its gap shapes do not matter.
+    - pair: condensed pieces.
+    - shapes (p, m): gap shapes [m per unit amplitude]; none if the gap of a case is given by itself.
+    """
+
+    model: PatchModel
+    pair: CondensedPair
+    shapes: np.ndarray
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions (m,) [m] of the nodes."""
+        return self.pair.compliance.interface.x
+
+    @property
+    def has_layer(self) -> bool:
+        """Whether an asperity layer lies between the pieces."""
+        return self.model.interface.skin is not None
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether a nonlinear asperity layer carries pressure at every separation."""
+        return self.has_layer and self.model.interface.skin.law != "linear"
+
+    @cached_property
+    def strip(self) -> StripProperties:
+        """Compliance [m/N] and nodal areas [m2] of one strip of the pieces, without layer."""
+        return split_into_strips(self.pair.compliance, 1)
+
+    @cached_property
+    def linear_layer(self) -> np.ndarray | None:
+        """Compliance (m,) [m/N] of a linear asperity layer at the nodes of a strip; None without such a layer."""
+        if not self.has_layer or self.is_smooth:
+            return None
+        return 1 / (self.model.interface.skin.normal_stiffness * self.strip.weight)
+
+    def add_layer(self, layer) -> tuple[np.ndarray, np.ndarray]:
+        """Return normal compliance (m, m) and shear compliance of one strip with a layer (m,) [m/N], or None, in series.
+
+        The shear compliance (b m, b m) of unlike pieces contains the normal one and the coupling of both (b = 2).
+        """
+        normal, tangential, _ = self.strip
+        if layer is not None:
+            normal = normal + np.diag(layer)
+            ratio = self.model.interface.skin.tangential_ratio
+            if ratio is not None:
+                tangential = tangential + np.diag(layer / ratio)
+        closing = self.pair.closing
+        if closing.any():
+            tangential = np.block([[normal, closing], [closing.T, tangential]])
+        return normal, tangential
+
+    @cached_property
+    def motions(self) -> np.ndarray:
+        """Closing (2, m) of the nodes per unit of approach and rotation."""
+        return np.stack([np.ones(self.x.size), self.x])
+
+    @cached_property
+    def shear_column(self) -> np.ndarray:
+        """Displacement (1, b m) of a unit slide at fixed approach."""
+        column = np.ones((1, self.x.size))
+        return np.hstack([0 * column, column]) if self.pair.closing.any() else column
+
+    @cached_property
+    def tables(self) -> tuple[SetTable, SetTable]:
+        """Contact sets of the normal compliance, for all columns, and of the shear compliance, for a unit slide.
+
+        A smooth layer has none, because its compliance differs between the cases.
+        """
+        normal, shear = self.add_layer(self.linear_layer)
+        columns = np.concatenate([self.motions, self.shapes])
+        return (
+            SetTable(normal, columns, self.x.size),
+            SetTable(shear, self.shear_column, self.x.size),
+        )
+
+    def limit_sets(self, max_sets: int) -> None:
+        """Discard the contact sets if there are more than `max_sets`, because many cases with own sets need much memory."""
+        for table in () if self.is_smooth else self.tables:
+            if table.n_sets > max_sets:
+                table.forget()
+
+
+class HolderPositions(NamedTuple):
+    """Positions of the upper holder in n cases.
+
+    - approach, rotation (n,): approach [m] and rotation [rad].
+    - turn (n,): part of the rotation [rad] that the unloaded gap does not contain.
+    - can_rotate (n,): whether the rotation is free.
+    - roll (n,): rotation [rad] about the x axis.
+    """
+
+    approach: np.ndarray
+    rotation: np.ndarray
+    turn: np.ndarray
+    can_rotate: np.ndarray
+    roll: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PressedCases:
+    """Contact of n cases at the m nodes of a mesh; a patch in strips has s strips of them.
+
+    - level: pieces on the mesh.
+    - force (n, s, m): nodal forces [N] >= 0, 0 of a case that failed.
+    - gap (n, s, m): gap under load [m]; with a smooth asperity law the separation of the mean planes.
+    - unloaded_gap (n, s, m): gap of the unloaded surfaces [m].
+    - holder: position of the upper holder.
+    - layer (n, s, m): compliance [m/N] of the asperity layer; None without a layer.
+    - variants: for a gap with a step at a node: (weights (n,), the cases with this node on the higher side of the
+      step), and the same on the lower side; else ().
+    """
+
+    level: Level
+    force: np.ndarray
+    gap: np.ndarray
+    unloaded_gap: np.ndarray
+    holder: HolderPositions
+    layer: np.ndarray | None = None
+    variants: "tuple[tuple[np.ndarray, PressedCases], ...]" = ()
+    computed: dict[Hashable, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.force)
+
+    @property
+    def x(self) -> np.ndarray:
+        """Positions (m,) [m] of the nodes."""
+        return self.level.x
+
+    @cached_property
+    def pressure(self) -> np.ndarray:
+        """Pressures (n, s, m) [Pa] of the strips."""
+        return self.force / self.level.strip.weight
+
+    @cached_property
+    def is_loaded(self) -> np.ndarray:
+        """Whether each node of each strip carries pressure (n, s, m), in a smooth layer a fraction of the peak."""
+        if not self.level.is_smooth:
+            return self.force > 0
+        peak = self.pressure.max(axis=(1, 2), keepdims=True)
+        return self.pressure > edges.MIN_CONTACT_PRESSURE_RATIO * peak
+
+    @cached_property
+    def mean_pressure(self) -> np.ndarray:
+        """Pressures (n, m) [Pa], means over the strips; pressures of a smooth layer that count as none are 0."""
+        return np.where(self.is_loaded, self.pressure, 0.0).mean(axis=1)
+
+    @property
+    def active(self) -> np.ndarray:
+        """Contact sets (n, m): whether any strip carries pressure at a node."""
+        return self.mean_pressure > 0
+
+    @cached_property
+    def load(self) -> np.ndarray:
+        """Normal loads (n,) [N]."""
+        return self.force.sum(axis=(1, 2))
+
+    @cached_property
+    def moment(self) -> np.ndarray:
+        """Moments (n,) [N m] of the pressure about x = 0."""
+        return (self.force @ self.x).sum(axis=1)
+
+    @cached_property
+    def layer_fraction(self) -> np.ndarray | None:
+        """Fraction (n, m) of the nodal compliance due to the asperity layer; None without a layer."""
+        if self.layer is None:
+            return None
+        bare = np.diag(self.level.strip.normal)
+        layer = self.layer.min(axis=1)
+        return layer / (bare + layer)
+
+    def flatten(self, values: np.ndarray) -> np.ndarray:
+        """Return values (n s, m) of all strips one after the other."""
+        return values.reshape(-1, values.shape[-1])
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Patch:
     """Contact patch with the solution of its static contact problem.
@@ -82,8 +270,7 @@ class Patch:
     - notes: notes on the gap and on the pressure.
     - seconds: CPU seconds by name.
     - averaging: length [m] over which a profile in contact is averaged; None without a profile.
-    - step_variants: for a gap with a step at a node: (weight, Patch) with this node on the higher
-      side of the step, and the same on the lower side; else ().
+    - pressed: the patch as a case of `PressedCases`, from which its measures follow.
     - points: PointSolution of a patch with a profile; None if the mesh has the finest solution.
     - measures: static measures by name with their errors, of the finest of several meshes
       (`measures.with_static_measures`); None for a patch that was solved on a single mesh.
@@ -100,7 +287,7 @@ class Patch:
     notes: tuple[str, ...] = ()
     seconds: Values = field(default_factory=dict)
     averaging: float | None = None
-    step_variants: "tuple[tuple[float, Patch], ...]" = ()
+    pressed: PressedCases | None = None
     points: PointSolution | None = None
     measures: Measures | None = None
     frames: Arrays = field(default_factory=dict)
@@ -164,22 +351,6 @@ class Patch:
         return self.has_skin and self.model.interface.skin.law != "linear"
 
     @property
-    def layer_compliance(self) -> np.ndarray | None:
-        """Compliance (s, m) [m/N] of the asperity layer at the nodes of each strip; None without a layer."""
-        if not self.has_skin:
-            return None
-        return compute_layer_compliance(self.model.interface.skin, self.state)
-
-    @property
-    def skin_fraction(self) -> np.ndarray | None:
-        """Fraction (m,) of the nodal compliance due to the asperity layer; None without a layer."""
-        if not self.has_skin:
-            return None
-        bare = np.diag(self.pair.compliance.normal) * len(self.state.force)
-        layer = self.layer_compliance.min(axis=0)
-        return layer / (bare + layer)
-
-    @property
     def active(self) -> np.ndarray:
         """Contact set (m,) of bool: whether each node carries pressure."""
         return self.pressure.sigma_n > 0
@@ -230,67 +401,122 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
         rows = [np.interp(x, coarse.x, row > 0) for row in coarse.state.force]
         start = np.array(rows) > 0.5
 
-    def solve_gap(gap) -> Patch:
-        """Solve the contact problem for an unloaded gap (m,) or (s, m) [m]."""
-        begin = process_time()
-        state = press_pieces(patch_model, pair.compliance, gap, start=start)
-        patch = _make_patch(patch_model, pair, gap, state)
-        times = pair.seconds | seconds | {"press": process_time() - begin}
-        return replace(patch, notes=notes, seconds=times)
-
-    patch = solve_gap(unworn_gap + worn)
+    begin = process_time()
+    level = Level(patch_model, pair, np.zeros((0, x.size)))
+    gap = unworn_gap + worn
+    state = press_pieces(patch_model, pair.compliance, gap, start=start)
+    pressed = _make_single_case(level, gap, state)
     half_steps = patch_model.gap.half_step_heights(x)
-    if not half_steps.any():
-        return patch
-    # A contact set ends less than half a cell beyond its last node. The solutions with and without
-    # the node at the step are weighted such that the mean contact edge is at the step.
-    node = int(np.argmax(half_steps))
-    bare_fraction = 1.0 if patch.skin_fraction is None else 1 - float(patch.skin_fraction[node])
-    cell = float(np.diff(x[node - 1 : node + 2]).min())
-    weight_shift = bare_fraction * edges.compute_edge_offset(cell, cell, 0.0, pair.row) / cell
-
-    # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
-    # node takes the worn depth of its neighbour there, and on the lower side likewise.
-    higher = node + 1
-    lower = node - 1
-    if unworn_gap[lower] < unworn_gap[higher]:
-        higher, lower = lower, higher
-    variants = []
-    for side, neighbour in ((-1, higher), (1, lower)):
-        moved = unworn_gap + side * half_steps + worn
-        moved[..., node] += worn[..., neighbour] - worn[..., node]
-        variants.append((0.5 - side * weight_shift, solve_gap(moved)))
-    return replace(patch, step_variants=tuple(variants))
+    if half_steps.any():
+        variants = []
+        for weight, moved in _list_step_variants(pressed, unworn_gap, half_steps, worn):
+            moved_state = press_pieces(patch_model, pair.compliance, moved, start=start)
+            variants.append((weight, _make_single_case(level, moved, moved_state)))
+        pressed = replace(pressed, variants=tuple(variants))
+    times = pair.seconds | seconds | {"press": process_time() - begin}
+    return replace(_make_patch(patch_model, pressed, state, gap), notes=notes, seconds=times)
 
 
-def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Patch:
-    """Return the Patch of a solved contact.
+def _make_single_case(level: Level, gap, state: StripsState) -> PressedCases:
+    """Return a solved patch as a single case.
 
     Parameters
     ----------
-    patch_model : PatchModel
-        Model that was solved.
-    pair : CondensedPair
-        Condensed pieces of the solution.
+    level : Level
+        Pieces on the mesh.
     gap : (m,) or (s, m)
         Unloaded gap [m].
     state : StripsState
         Solution on the nodes of the pieces.
     """
+    layer = None
+    if level.has_layer:
+        layer = compute_layer_compliance(level.model.interface.skin, state)[None]
+    return PressedCases(
+        level,
+        state.force[None],
+        state.gap[None],
+        np.broadcast_to(gap, state.gap.shape)[None],
+        HolderPositions(
+            np.array([state.position.delta]),
+            np.array([state.position.theta]),
+            np.array([state.position.theta - level.model.gap.angle]),
+            np.array([level.model.loading.moment is not None]),
+            np.array([state.position.roll]),
+        ),
+        layer,
+    )
+
+
+def _list_step_variants(pressed: PressedCases, unworn_gap, half_steps, worn):
+    """Return weight and gap of a patch with the node at a step on either side of the step.
+
+    A contact set ends less than half a cell beyond its last node. The solutions with and without the node at the step are
+    weighted such that the mean contact edge is at the step.
+
+    Parameters
+    ----------
+    pressed : PressedCases
+        The patch with the node at half the height of the step.
+    unworn_gap, half_steps : (m,) ndarray
+        Gap before wear, and half the height of the step at its node [m].
+    worn : (m,) or (s, m) ndarray
+        Worn depth [m].
+
+    Returns
+    -------
+    list of tuple
+        (weight (1,), gap (m,) or (s, m) [m]) for both sides.
+    """
+    node = int(np.argmax(half_steps))
+    weight_shift = compute_step_weight_shift(pressed, node)
+
+    # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
+    # node takes the worn depth of its neighbour there, and on the lower side likewise.
+    neighbours = [node - 1, node + 1]
+    neighbours.sort(key=lambda neighbour: unworn_gap[neighbour])
+    variants = []
+    for side, neighbour in zip((-1, 1), neighbours):
+        moved = unworn_gap + side * half_steps + worn
+        moved[..., node] += worn[..., neighbour] - worn[..., node]
+        variants.append((0.5 - side * weight_shift, moved))
+    return variants
+
+
+def compute_step_weight_shift(pressed: PressedCases, node: int) -> np.ndarray:
+    """Return by how much (n,) the weights of the two variants of a step at a node differ from one half.
+
+    `pressed` are the cases with the node at half the height of the step.
+    """
+    cell = float(np.diff(pressed.x[node - 1 : node + 2]).min())
+    shift = edges.compute_edge_offset(cell, cell, 0.0, pressed.level.pair.row) / cell
+    if pressed.layer_fraction is None:
+        return np.full(len(pressed), shift)
+    return shift * (1 - pressed.layer_fraction[:, node])
+
+
+def _make_patch(patch_model, pressed: PressedCases, state: StripsState, gap) -> Patch:
+    """Return the Patch of a single case.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Model that was solved.
+    pressed : PressedCases
+        The patch as a single case.
+    state : StripsState
+        The same solution with the position of the holder and the residuals.
+    gap : (m,) or (s, m)
+        Unloaded gap [m].
+    """
+    pair = pressed.level.pair
     loading = patch_model.loading
     interface = patch_model.interface
     skin = interface.skin
 
-    # A smooth law never reaches 0; what is set to 0 is smaller than the residual of the load balance.
-    pressure = state.pressure
-    if skin is not None and skin.law != "linear":
-        pressure = np.where(
-            pressure > edges.MIN_CONTACT_PRESSURE_RATIO * pressure.max(), pressure, 0.0
-        )
-
-    # The patch is a single strip.
+    # The fields of a patch are those of its only strip.
     mean_state = ContactState(
-        frozen_array(pressure.mean(axis=0)),
+        frozen_array(pressed.mean_pressure[0]),
         frozen_array(state.gap.min(axis=0)),
         state.position.delta,
         state.position.theta,
@@ -305,7 +531,7 @@ def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Pa
     pieces = pair.compliance
     layer_shear = 0.0
     if skin is not None:
-        layer = np.diag(compute_layer_compliance(skin, state)[0])
+        layer = np.diag(pressed.layer[0, 0])
         if skin.tangential_ratio is not None:
             layer_shear = layer / skin.tangential_ratio
         normal = frozen_array(pieces.normal + layer)
@@ -326,7 +552,114 @@ def _make_patch(patch_model, pair: CondensedPair, gap, state: StripsState) -> Pa
         slip_compliance=slip_compliance,
         unloaded_gap=frozen_array(gap),
         averaging=patch_model.gap.averaging_length(pieces.interface.x, mean_state.sigma_n > 0),
+        pressed=pressed,
     )
+
+
+def make_level(patch_model, pair: CondensedPair) -> Level:
+    """Return the pieces and the gap shapes of a group of cases on a mesh.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch of all cases.
+    pair : CondensedPair
+        Pieces, condensed on the mesh.
+    """
+    x = pair.compliance.interface.x
+    return Level(patch_model, pair, make_gap_shapes(patch_model, x, pair.end_gap))
+
+
+def press_on_level(
+    level: Level, cases: Cases, start
+) -> tuple[PressedCases, dict[int, PatchfemError]]:
+    """Press the cases of a group without strips on a mesh.
+
+    Cases whose contact set is not found on the table, and those with a smooth asperity layer, are pressed one by one.
+
+    Parameters
+    ----------
+    level : Level
+        Pieces on the mesh, with the gap shapes of the group.
+    cases : Cases
+        n cases.
+    start : (n, m) bool ndarray
+        Contact sets from which the search starts.
+
+    Returns
+    -------
+    PressedCases
+    errors : dict
+        Error of each case that cannot be pressed, by its number.
+    """
+    with use_one_blas_thread():
+        pressed, errors = _press_gaps(level, cases, start)
+        # A step between two nodes, as on a mesh that the scene prescribes, has no variants
+        variants = []
+        has_step_node = cases.half_steps is not None and level.shapes[-1].any()
+        for side, moved in cases.variants if has_step_node else ():
+            node = int(np.argmax(level.shapes[-1]))
+            part, more_errors = _press_gaps(level, moved, pressed.active)
+            errors = more_errors | errors
+            shift = compute_step_weight_shift(pressed, node)
+            variants.append((0.5 - side * shift, part))
+    return replace(pressed, variants=tuple(variants)), errors
+
+
+def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[int, PatchfemError]]:
+    """Press the cases of a group on a mesh, with the nodes at steps at the heights that the amplitudes give.
+
+    The parameters and results are those of `press_on_level`.
+    """
+    shape = (cases.n_cases, 1, level.x.size)
+    holders = cases.holders
+    unloaded_gap = np.broadcast_to((cases.amplitudes @ level.shapes)[:, None], shape)
+    force = np.zeros(shape)
+    gap = unloaded_gap.copy()
+    layer = None
+    if level.has_layer:
+        own = 1.0 if level.is_smooth else level.linear_layer
+        layer = np.broadcast_to(own, shape).copy()
+    approach = np.zeros(cases.n_cases)
+    turn = np.zeros(cases.n_cases)
+    alone = np.arange(cases.n_cases)
+
+    if not level.is_smooth:
+        table = level.tables[0]
+        sets = press_on_table(table, holders, cases.amplitudes, start)
+        solved = np.flatnonzero(sets.is_solved)
+        slots = sets.slot[solved]
+        unknown = table.combine(slots, sets.closing[solved])
+        active = table.active[slots]
+        force[solved, 0] = np.where(active, unknown, 0.0)
+        gap[solved, 0] = np.where(active, 0.0, np.maximum(unknown, 0.0))
+        approach[solved] = sets.closing[solved, 0]
+        turn[solved] = -sets.closing[solved, 1]
+        alone = np.flatnonzero(~sets.is_solved)
+
+    errors = {}
+    for case in alone:
+        try:
+            state = press_pieces(
+                level.model,
+                level.pair.compliance,
+                unloaded_gap[case],
+                holder=_make_holder(cases, case),
+            )
+        except PatchfemError as error:
+            errors[int(case)] = error
+            continue
+        force[case] = state.force
+        gap[case] = state.gap
+        approach[case] = state.position.delta
+        turn[case] = state.position.theta - cases.rotation[case]
+        if layer is not None:
+            layer[case] = compute_layer_compliance(level.model.interface.skin, state)
+
+    holder = HolderPositions(
+        approach, cases.rotation + turn, turn, holders.can_rotate, roll=np.zeros(cases.n_cases)
+    )
+    return PressedCases(level, force, gap, unloaded_gap, holder, layer), errors
 
 
 def make_contact_force_function(patch_model, pair: CondensedPair):
@@ -352,7 +685,9 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
     return compute_forces
 
 
-def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -> StripsState:
+def press_pieces(
+    patch_model, pieces: Compliance, gap, added=None, start=None, holder: Holder | None = None
+) -> StripsState:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
     The patch is the only strip of `contact.press`.
@@ -369,12 +704,13 @@ def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -
         What each strip adds to the diagonal of its compliance [m/N].
     start : (s, m) ndarray of bool, optional
         Nodes in contact of a similar solution, from which the search starts.
+    holder : Holder, optional
+        Load and prescribed motions in place of those of the model.
 
     Returns
     -------
     StripsState
     """
-    loading = patch_model.loading
     strip = split_into_strips(pieces, 1)
     offsets = np.zeros(1)
 
@@ -384,15 +720,22 @@ def press_pieces(patch_model, pieces: Compliance, gap, added=None, start=None) -
         None if patch_model.interface.skin is None else make_skin_law(patch_model),
     )
 
-    # Under a prescribed approach, at which no piece rotates, the load follows from the solution.
-    holder = Holder(
-        load=loading.load,
-        approach=loading.approach,
-        moment=loading.moment,
-        spring=loading.rotational_stiffness,
-        rotation=patch_model.gap.angle,
-    )
+    holder = holder or _make_holder(make_cases(patch_model, 1), 0)
     return press_strips(strips, gap, holder, start)
+
+
+def _make_holder(cases: Cases, case: int) -> Holder:
+    """Return load and prescribed motions of one case."""
+    numbers = np.array(cases.holders)[:, case].tolist()
+    load, approach, moment, spring = (None if np.isnan(one) else one for one in numbers)
+    # Under a prescribed approach, at which no piece rotates, the load follows from the solution.
+    return Holder(
+        load=load,
+        approach=approach,
+        moment=moment,
+        spring=spring,
+        rotation=float(cases.rotation[case]),
+    )
 
 
 def compute_layer_compliance(skin, state: StripsState) -> np.ndarray:

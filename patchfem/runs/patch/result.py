@@ -11,6 +11,7 @@ from ...formatting import format_length, format_quantity
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
+from ...scene.keys.contact import Material
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
 from .measures import note_on_plane_state
@@ -68,40 +69,16 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
     has_error_mesh : bool
         Whether the patch is solved on another mesh too, from which its errors follow.
     """
-    # Linear elasticity assumes small strains, which two ratios check.
-    materials = []
-    for piece in patch_model.pieces.both:
-        materials += [piece.substrate, *([piece.coating.material] if piece.coating else [])]
-    strains = {
-        "the peak pressure is {:.3g} of the lowest Young's modulus": (
-            patch.pressure.sigma_n.max(initial=0.0) / min(material.young for material in materials)
-        ),
-        "the approach is {:.3g} of the total height of the two pieces": (
-            patch.pressure.approach / sum(piece.height for piece in patch_model.pieces.both)
-        ),
-    }
-
-    warnings = []
-    for words, strain in strains.items():
-        if strain > MAX_SMALL_STRAIN:
-            limit = f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
-            warnings.append(words.format(strain) + limit)
-
-    if patch_model.area is None and contact_reaches_steep_end(patch):
+    warnings = warn_of_strains(
+        patch_model, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach
+    )
+    if patch_model.area is None and contact_reaches_steep_end(patch.pressed).any():
         warnings.append(
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
             "contact is computed; lower the tilt or the load"
         )
 
-    # A mesh that the run chose is refined until locking is part of its error; a given mesh is not.
-    poisson = max(material.poisson for material in materials)
-    is_fixed = not patch_model.mesh.is_automatic
-    if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON_RATIO and is_fixed:
-        warnings.append(
-            "in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5; here "
-            f"Poisson's ratio is {poisson:g} (limit {MAX_POISSON_RATIO:g}), so the true errors may be "
-            f"twice the estimates; {_advise_shorter_elements(patch_model)}"
-        )
+    warnings += warn_of_locking(patch_model)
 
     # Warnings on the profile, and on a mesh without a coarser one for an error estimate.
     warnings += [text for text in patch.notes if not surface.nodes.is_note(text)]
@@ -111,6 +88,56 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
             f"error; {_advise_shorter_elements(patch_model)}"
         )
     return warnings
+
+
+def warn_of_strains(patch_model, pressure: float, approach: float) -> list[str]:
+    """Return warnings on strains beyond the small ones that linear elasticity assumes.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch with the materials and heights of the pieces.
+    pressure : float
+        Largest pressure [Pa] at a node.
+    approach : float
+        Approach [m].
+    """
+    lowest_young = min(material.young for material in _list_materials(patch_model))
+    height = sum(piece.height for piece in patch_model.pieces.both)
+    strains = {
+        "the peak pressure is {:.3g} of the lowest Young's modulus": pressure / lowest_young,
+        "the approach is {:.3g} of the total height of the two pieces": approach / height,
+    }
+    limit = f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
+    warnings = []
+    for words, strain in strains.items():
+        if strain > MAX_SMALL_STRAIN:
+            warnings.append(words.format(strain) + limit)
+    return warnings
+
+
+def warn_of_locking(patch_model) -> list[str]:
+    """Return a list with a warning on elements that are too stiff at a Poisson's ratio near 0.5.
+
+    A mesh that the run chose is refined until locking is part of its error; a given mesh is not.
+    """
+    poisson = max(material.poisson for material in _list_materials(patch_model))
+    is_fixed = not patch_model.mesh.is_automatic
+    if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON_RATIO and is_fixed:
+        return [
+            "in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5; here "
+            f"Poisson's ratio is {poisson:g} (limit {MAX_POISSON_RATIO:g}), so the true errors may be "
+            f"twice the estimates; {_advise_shorter_elements(patch_model)}"
+        ]
+    return []
+
+
+def _list_materials(patch_model) -> list[Material]:
+    """Return the materials of the substrates and coatings of both pieces."""
+    materials = []
+    for piece in patch_model.pieces.both:
+        materials += [piece.substrate, *([piece.coating.material] if piece.coating else [])]
+    return materials
 
 
 def _advise_shorter_elements(patch_model) -> str:

@@ -7,6 +7,7 @@ prescribed elements or with a mesh file have equal meshes in all cases anyway.
 """
 
 from dataclasses import astuple
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -79,7 +80,7 @@ def choose_shared_meshes(
         return tuple(mesh_levels.make_given_meshes(patch_model))
     cases, are_all_patches = select_distinct_patches(patches)
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
-    layout, contact = grids.search_layout(cases)
+    layout, contact = grids.search_layout(patch_model, partial(grids.find_contacts_alone, cases))
     if contact is None:
         return None
     # If the contact edges move or the patch slips partially, the initial contact does not determine

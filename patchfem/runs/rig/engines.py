@@ -138,8 +138,8 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> C
     Each has a quarter of the steps of the run and is compared with a run that has as many:
 
     - a coarser mesh, if the run has a coarser patch and its load varies or it slips in part;
-    - another number of shear modes, if the load varies, the slide goes over grooves, or a law with bonds
-      acts at the nodes of a patch;
+    - another number of shear modes, if the load varies, the slide goes over grooves, or a law acts at the nodes of a
+      patch;
     - other settings of a bond summation.
 
     Parameters
@@ -165,8 +165,9 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> C
         meshes[0] = replace(meshes[0], shear_modes=n_modes)
     coarser_runs = [CoarserRuns((mesh,), second_order_errors, quarter, "mesh") for mesh in meshes]
 
-    has_node_bonds = coarse is not None and law_has_trait(model.friction.law, "bonds")
-    if n_modes and (varies or model.grooves is not None or has_node_bonds):
+    reduction = getattr(solution.contact, "reduction", None)
+    has_modes = isinstance(reduction, slip.shear_modes.ShearModes)
+    if n_modes and (varies or model.grooves is not None or has_modes):
         coarser = replace(quarter, shear_modes=slip.shear_modes.comparison_mode_count(n_modes))
         coarser_runs.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
     return [*coarser_runs, *_list_bond_sum_runs(model, quarter, patch, solution)]

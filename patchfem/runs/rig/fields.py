@@ -54,16 +54,16 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
             return np.array([getattr(snapshot, name) for snapshot in snapshots])
         return getattr(window, name)[samples]
 
-    # The points of a march may have bonds of their own.
+    # The points of a march are nodes of the patch, unless parallel elements replace them.
     has_shear = bool(snapshots) and model.partial_slip
     is_march = bool(snapshots) and isinstance(snapshots[0], points.time_march.Snapshot)
-    has_node_bonds = False
-    if is_march and snapshots[0].forces.size > 1 and law_has_trait(f.law, "bonds"):
+    has_nodes = False
+    if is_march and snapshots[0].forces.size > 1:
         is_below = model.side == "lower" and model.grooves is None and not needs_bond_list(f)
-        has_node_bonds = has_shear or is_below
+        has_nodes = is_below or (has_shear and solution.contact.elements is None)
 
     rule = SlipRule()
-    if has_node_bonds or (has_shear and model.grooves is not None):
+    if has_nodes or (has_shear and model.grooves is not None):
         tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
         reduction = getattr(solution.contact, "reduction", None)

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import friction, points, slip
+from ... import friction, points, slip, time_steps
 from ...core import PatchfemError
-from ...effects import law_has_trait
+from ...effects import law_has_trait, law_supports
 from ...hybrid import laws as hybrid_laws
 from ...hybrid.cases import Load, UndrivenRig, list_interfaces
 from ...hybrid.laws.grooves import make_grooves
@@ -32,6 +32,10 @@ from .numerics import Numerics
 NO_STEADY_LOOP = (
     'bonds have a steady loop only with friction.reading = "stretch", friction.order = 1, a constant bond length and '
     "pieces that are rigid in shear; run the scene in time instead"
+)
+NO_SOFT_LOOP = (
+    "a patch that slips part by part has a steady loop only under law 'coulomb' or 'elastic-plastic'; run the scene in "
+    "time instead"
 )
 MAX_STUCK_SLIP_RATIO = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
 
@@ -79,6 +83,12 @@ class Joint(NamedTuple):
         if self.stiffness is not None:
             return points.laws.make_elements(self.stiffness, self.yields)
         return points.laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
+
+    def make_step_law(self):
+        """Return the law under its mean load as a `time_steps.laws.PointLaw`."""
+        if self.stiffness is not None:
+            return time_steps.laws.make_elements(self.stiffness, self.yields)
+        return time_steps.laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
 
     def make_hybrid_law(self) -> LawNumbers:
         """Return the law as LawNumbers, the form for the engine `hybrid`, which integrates from event to event."""
@@ -141,7 +151,7 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     if not friction.interfaces:
         return []
     if patch is not None:
-        law = _replace_averaged_law(model.friction, model, patch)
+        law = replace_averaged_law(model.friction, model, patch)
         contact_load = float(patch.pressure.load)
         parts = _list_patch_parts(model, patch)
         return [Joint(law, load, speed, contact_load, *elements) for load, elements in parts]
@@ -151,14 +161,19 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         load = interface.load
         load = _make_point_load(model.point) if load is None else Load(load)
         parts = ()
-        if interface.partial_slip:
+        if interface.partial_slip and has_elements(interface.numbers):
             parts = faces.make_patch_elements(interface, model.accuracy.tolerance, k in meshed)
-        law = _replace_averaged_law(interface.numbers, model, patch)
+        law = replace_averaged_law(interface.numbers, model, patch)
         joints.append(Joint(law, load, speed, load.mean, *parts))
     return joints
 
 
-def _replace_averaged_law(law, model: Model, patch):
+def has_elements(law) -> bool:
+    """Return whether a patch with a law that slips part by part is a set of parallel elements, under a constant load."""
+    return law_supports(law, "pieces") and law_supports(law, "shear")
+
+
+def replace_averaged_law(law, model: Model, patch):
     """Return Coulomb's law in place of a law that averages the pressure; other laws are unchanged.
 
     On a rigid block the sum of the friction limits of all nodes is a constant fraction of the load, which replaces the
@@ -183,7 +198,7 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
     """
     slide_apart = model.rig.friction.bands_slide_apart
     load = Load(float(patch.pressure.load))
-    if not model.partial_slip:
+    if not (model.partial_slip and has_elements(model.friction)):
         if not slide_apart:
             return [(load, ())]
         return [(Load(float(load)), ()) for load in bands.compute_band_loads(patch)]
@@ -332,7 +347,12 @@ def make_undriven_rig(model: Model, numerics: Numerics, patch) -> UndrivenRig:
     """
     rig = model.rig
     joints = list_joints(model, patch, numerics.meshed)
-    for joint in joints:
+    is_soft = [model.partial_slip] * len(joints)
+    if patch is None:
+        is_soft = [interface.partial_slip for interface in rig.friction.interfaces]
+    for joint, soft in zip(joints, is_soft):
+        if soft and joint.stiffness is None:
+            raise PatchfemError(NO_SOFT_LOOP)
         has_bonds = joint.stiffness is None and law_has_trait(joint.law.law, "bonds")
         if has_bonds and joint.law.rest_growth is not None:
             raise PatchfemError(NO_STEADY_LOOP)

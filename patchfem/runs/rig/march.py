@@ -18,8 +18,8 @@ from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ..bench.engine import BondListGuard
 from . import bands
 from .bond_lists import choose_bond_summation, has_bond_list, refuse_long_stick
+from .contact_points import make_contact
 from .evaluation import RunEvaluator, compute_work_check
-from .joints import make_contact
 from .solution import Fields, Solution, compute_sampled_loop, describe_escape, find_travel
 
 

@@ -203,7 +203,7 @@ def compute_point_slip_path(model, window, values: Values) -> tuple[float, float
     path, error = _integrate_uniform_slip(model, cycle)
     if model.rig is not None:
         error += _slip_amplitude_change(values, cycle)
-    return path, error
+    return path / _count_path_cycles(model, window), error
 
 
 def _follow_slide(model, patch, frames: int) -> _Motion:
@@ -292,7 +292,8 @@ def _select_last_cycle(model, window, load: float) -> _Cycle:
     """Return the motion of a bench or a rig as a whole in its last cycle.
 
     `window` has the histories of the last cycles. `load` [N] is the load of the patch or point, or its mean. Over grooves
-    the window of a rig has the vertical force.
+    the window of a rig has the vertical force. Under a load that oscillates, the motion has as many cycles as the load
+    and the drive need to repeat.
     """
     if model.rig is None:
         rows = slice(window.first, None)
@@ -305,9 +306,18 @@ def _select_last_cycle(model, window, load: float) -> _Cycle:
 
 
 def _is_in_last_cycle(model, window) -> np.ndarray:
-    """Return whether each sample of a window is in its last cycle."""
-    period = model.rig.drive.signal.period
+    """Return whether each sample of a window is in its last cycle, or in the cycles after which load and drive repeat."""
+    period = model.rig.drive.signal.period * _count_path_cycles(model, window)
     return window.time >= window.time[-1] - period * (1 + 1e-9)
+
+
+def _count_path_cycles(model, window) -> int:
+    """Return the number of drive cycles after which the drive and the load of a rig repeat; at most those of the window."""
+    if model.rig is None:
+        return 1
+    repeat = model.rig.count_repeat_cycles(model.point) or 1.0
+    n_cycles = round((window.time[-1] - window.time[0]) / model.rig.drive.signal.period)
+    return max(1, min(round(repeat), n_cycles))
 
 
 def _make_point_slip(model, cycle: _Cycle) -> _PointSlip:

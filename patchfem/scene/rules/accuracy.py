@@ -177,10 +177,6 @@ def _find_reason_without_effect(setting: str, accuracy: Accuracy, motion: Motion
     # Elements in closed form need no shear modes.
     if not motion.compliance:
         return "for pieces that are rigid in shear"
-    if (
-        motion.load_change
-        or motion.has_grooves
-        or any(law_has_trait(law.law, "bonds") for law in laws)
-    ):
+    if motion.load_change or motion.grooves or any(law_has_trait(law.law, "bonds") for law in laws):
         return ""
     return f"for law '{laws[0].law}' under a constant load (this case is solved exactly without the key)"

@@ -10,6 +10,7 @@ from ...effects import (
     has_return_map,
     law_has_trait,
     law_supports,
+    law_takes_stiffness_or_length,
     needs_bond_list,
     suggest_laws,
 )
@@ -38,7 +39,8 @@ class MotionFeatures(NamedTuple):
     - joints: the interfaces with friction.
     - load_change: cause of a load that changes, such as "with normal.amplitude".
     - bands_yaw: whether bands of cells of the patch slide independently.
-    - spring: key of the nonlinear spring of the rig, or of the grooves that the upper piece climbs.
+    - spring: key of the nonlinear spring of the rig.
+    - grooves: table of the grooves that the upper piece climbs.
     - waveform: record of the waveform of the drive, in `effects`; NO_WAVEFORM for a release and for a response curve.
     - drive: the table [drive].
     - lower_shape: shape that moves the pressure with the lower piece, such as "contact.crown.on = 'lower'".
@@ -48,6 +50,7 @@ class MotionFeatures(NamedTuple):
     load_change: str
     bands_yaw: bool
     spring: str
+    grooves: str
     waveform: Waveform
     drive: Drive | None = None
     lower_shape: str = ""
@@ -56,11 +59,6 @@ class MotionFeatures(NamedTuple):
     def compliance(self) -> str:
         """Key of the compliance that enables partial slip, for the first patch that has one."""
         return next((joint.compliance for joint in self.joints if joint.compliance), "")
-
-    @property
-    def has_grooves(self) -> bool:
-        """Whether `spring` is a key of grooves."""
-        return self.spring.endswith("grooves]")
 
     def describe_features(self) -> dict[str, str]:
         """Return features of the motion that an engine may lack, by name, as the end of a message.
@@ -73,8 +71,8 @@ class MotionFeatures(NamedTuple):
             "yaw": "with bands that yaw" if self.bands_yaw else "",
             "yaw-levels": "",
             "parts": f"with {self.compliance}" if self.compliance else "",
-            "grooves": "",
-            "spring": "",
+            "grooves": f"with {self.grooves}" if self.grooves else "",
+            "spring": f"with {self.spring}" if self.spring else "",
             "faces": "with several interfaces" if len(self.joints) > 1 else "",
             "levels": "with waveform 'levels'" if self.waveform.has_levels else "",
             # the pressure changes with the motion
@@ -82,8 +80,6 @@ class MotionFeatures(NamedTuple):
         }
         if words["yaw"] and words["levels"]:
             words["yaw-levels"] = f"{words['yaw']} and waveform 'levels'"
-        if self.spring:
-            words["grooves" if self.has_grooves else "spring"] = f"with {self.spring}"
         return words
 
 
@@ -159,9 +155,16 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
             is_supported &= is_rigid
         elif support.law == "pieces" and is_rigid:
             is_supported &= not law_has_trait(joint.law.law, "set-valued")
+        elif support.law == "pieces":
+            is_supported = _has_elements(joint)
         if not is_supported:
             return joint
     return None
+
+
+def _has_elements(joint: Joint) -> bool:
+    """Return whether an interface that slips part by part is a set of parallel elements."""
+    return law_supports(joint.law, "pieces") and law_supports(joint.law, "shear")
 
 
 def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
@@ -171,12 +174,14 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     of a fixed number of values.
     """
     law = joint.law.law
-    if motion.has_grooves:
+    if motion.grooves:
         return law_has_trait(law, "memoryless") and not joint.compliance
     if joint.compliance:
-        return law_supports(joint.law, "pieces")
+        return _has_elements(joint)
     if motion.load_change:
-        return law in VARYING_LAWS
+        # Regimes of the elastic-plastic law have springs that come and go with the load.
+        is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)
+        return law in VARYING_LAWS and not is_fixed
     if law_has_trait(law, "bonds"):
         return not (needs_bond_list(joint.law) or motion.lower_shape)
     return True
@@ -210,9 +215,8 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     """
     scene = TableView(tables)
     if kind != "rig":
-        return MotionFeatures(
-            [], "", False, find_nonlinear_spring(tables), find_waveform(tables.drive), tables.drive
-        )
+        spring = find_nonlinear_spring(tables)
+        return MotionFeatures([], "", False, spring, "", find_waveform(tables.drive), tables.drive)
     tables_of_laws = [tables.friction, *(view.table for view in scene.structure.interface)]
     laws = [law for law in tables_of_laws if law is not None and law.law is not None]
     load_change = find_load_change_key(tables) if laws else ""
@@ -221,7 +225,8 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
         joints=[Joint(law, find_compliance_key(law, tables)) for law in laws],
         load_change=load_change and f"with {describe_load_change(load_change)}",
         bands_yaw=bool(scene.contact.area and find_yaw_key(tables)),
-        spring=find_nonlinear_spring(tables) or find_climbed_grooves(tables),
+        spring=find_nonlinear_spring(tables),
+        grooves=find_climbed_grooves(tables),
         waveform=find_waveform(tables.drive),
         drive=tables.drive,
         lower_shape=f"{lower[0]} = 'lower'" if lower else "",
@@ -323,7 +328,7 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
     in_steps = limits["march"]
     without_events = f"the motion cannot be computed from event to event {by_events}"
     law = motion.joints[0].law.law if motion.joints else None
-    is_climbing = motion.has_grooves and not motion.compliance and law_has_trait(law, "memoryless")
+    is_climbing = motion.grooves and not motion.compliance and law_has_trait(law, "memoryless")
     obstacles = {
         "auto": in_steps
         and by_events
@@ -363,10 +368,10 @@ def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> s
     feature = limits["harmonic"]
     if not feature and limits["hybrid"]:
         feature = limits["hybrid"]
-        if motion.has_grooves:
-            feature = f"with {motion.spring} {feature}"
+        if motion.grooves:
+            feature = f"with {motion.grooves} {feature}"
         joint = _find_unsupported_joint(ENGINE_SUPPORT["hybrid"], motion)
-        if joint is not None and not (motion.has_grooves or law_supports(joint.law, "harmonic")):
+        if joint is not None and not (motion.grooves or law_supports(joint.law, "harmonic")):
             remedy = f"use 'march', or {suggest_laws('harmonic', friction=joint.law)}"
             return describe_unsupported(f"'harmonic' with {describe_law(joint.law)}", remedy)
     return feature and describe_unsupported(f"'harmonic' {feature}", "march")

@@ -44,6 +44,15 @@ from .view import ViewValue, wrap_value
 
 # Features of the whole scene: their rows are tried once, also where no law could be read.
 SCENE_FEATURES = ("wear", "structure.measured=stuck", "sensor apart from the output")
+# Keys of a scene whose joint has no single stiffness that could be subtracted from measured modes
+VARIABLE_STIFFNESS_KEYS = (
+    "structure.masses",
+    "structure.reduced",
+    "structure.bonded.wavelength",
+    "contact.grooves",
+    "normal.grooves",
+    "normal.amplitude",
+)
 # Methods of accuracy.quadrature that sum single bonds
 SINGLE_BOND_SUMS = ("direct", "truncated", "merged")
 
@@ -157,6 +166,26 @@ class Joint(TableFacts):
         return bool(is_unbounded and self.initial_bonds)
 
     @property
+    def variable_stiffness_key(self) -> str:
+        """Key of what leaves the joint of measured modes without a single stiffness in stick; "" if it has one."""
+        written = [key for key in VARIABLE_STIFFNESS_KEYS if self.find_key_value(key)]
+        if any(face.contact for face in self.scene.structure.interface):
+            written.append("[structure.interface.contact]")
+        return next(filter(None, [*written, self.heave_key, self.yaw]), "")
+
+    @property
+    def bounding_key(self) -> str:
+        """Key of what makes the motion depend on that of the output; "" if nothing does."""
+        if self.wave.has_levels or (
+            self.wave.is_swept and self.scene.accuracy.method != "harmonic"
+        ):
+            return f"drive.waveform = '{self.scene.drive.waveform}'"
+        if self.scene.drive.kind == "free":
+            return "drive.kind = 'free'"
+        keys = ("structure.travel", "structure.stiffening")
+        return next(filter(self.find_key_value, keys), "")
+
+    @property
     def is_read(self) -> bool:
         """Whether the properties of the joint are known: it is an interface, or has a known law in a bench or a rig."""
         return self.is_interface or (self.law in LAWS and self.kind in ("bench", "rig"))
@@ -178,7 +207,6 @@ class Feature(NamedTuple):
 
 # Features that only the friction law has, with a function of the joint that tells whether it has them.
 LAW_FEATURES = {
-    "law for a constant load": lambda j: not j.has_trait("bonds") and j.lacks("varying-load"),
     "law with memory for a constant pressure": lambda j: (
         not j.has_trait("memoryless") and not j.has_trait("bonds") and j.lacks("varying-load")
     ),
@@ -188,7 +216,6 @@ LAW_FEATURES = {
     "law for rigid pieces": lambda j: (
         not j.is_interface and not j.has_trait("bonds") and j.lacks("shear")
     ),
-    "law without elements": lambda j: j.is_interface and j.lacks("pieces", "shear"),
     "law for one interface": lambda j: j.lacks("joints"),
     "law for flat faces": lambda j: not j.needs_list and j.lacks("grooves"),
     "law without bonds": lambda j: not j.has_trait("bonds"),
@@ -209,22 +236,26 @@ JOINT_FEATURES = {
         "a single contact point",
     ),
     "drive other than a sine": Feature(
-        lambda j: j.wave.name and not j.wave.is_sine,
+        lambda j: j.scene.drive.kind == "free" or (j.wave.name and not j.wave.is_sine),
         "drive.waveform",
-        "drive.waveform = '{scene.drive.waveform}'",
-    ),
-    "levels or sweep in time": Feature(
-        lambda j: j.wave.has_levels or (j.wave.is_swept and j.scene.accuracy.method != "harmonic"),
-        "drive.waveform",
-        "drive.waveform = '{scene.drive.waveform}'",
+        "a motion that is not steady",
     ),
     "sensor apart from the output": Feature(lambda j: j.instrument_key, "{instrument_key}"),
+    "output that bounds the motion": Feature(lambda j: j.bounding_key, "{bounding_key}"),
+    "joint without a single stiffness": Feature(
+        lambda j: j.variable_stiffness_key, "{variable_stiffness_key}"
+    ),
     # the load
     "mode with heave or pitch": Feature(lambda j: j.heave_key, "{heave_key}"),
     "changing load": Feature(
         lambda j: j.kind == "rig" and j.load_change, "{load_change}", "{load_change_description}"
     ),
     # the law; LAW_FEATURES has more
+    "memory of the slip": Feature(
+        lambda j: not j.has_trait("memoryless") or j.compliance,
+        "",
+        "a friction force that depends on earlier slip",
+    ),
     "kinetic below static": Feature(
         lambda j: j.has_trait("set-valued") and j.supports("shear") and -1 < j.kinetic < j.static,
         "{table_key}.kinetic",
@@ -254,6 +285,11 @@ JOINT_FEATURES = {
         "'{scene.accuracy.quadrature}'",
     ),
     # the patch
+    "nonlinear asperities": Feature(
+        lambda j: j.contact.asperities.law in ("exponential", "hertz"),
+        "{patch_key}.asperities.law",
+        "'{contact.asperities.law}'",
+    ),
     "patch that slips as a whole": Feature(lambda j: not j.compliance),
     "partial slip": Feature(lambda j: j.compliance, "{compliance}"),
     "shape on the lower piece": Feature(
@@ -278,10 +314,6 @@ JOINT_FEATURES = {
     "patch of an interface": Feature(
         lambda j: j.is_interface and j.contact, "{patch_key}", "[structure.interface.contact]"
     ),
-    "patches of interfaces": Feature(
-        lambda j: any(face.contact for face in j.scene.structure.interface),
-        "[structure.interface.contact]",
-    ),
 }
 
 
@@ -299,7 +331,6 @@ def find_feature(name: str) -> Feature:
 
 # What names in braces in the advice of support.toml stand for.
 LAW_ADVICE = {
-    "{laws_with_pieces}": suggest_laws("pieces", "shear"),
     "{laws_with_shear}": suggest_laws("shear"),
     "{laws_with_varying_load}": suggest_laws("varying-load"),
 }

@@ -4,15 +4,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_texts import PATCH
+from scene_texts import COULOMB, DRIVE, MODE, PATCH
 
 from patchfem.campaigns import Cases, SweepScene, WorkerData, iterate_chunks
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import choose_shared_meshes
+from patchfem.campaigns.sweeps.sweep import prepare_work
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_assignments
 
+MOTION = COULOMB + MODE + DRIVE
 WORK = WorkerData(
     SweepScene(Path("a.toml"), PATCH),
     Cases(
@@ -27,9 +28,8 @@ def test_exact_meshes_are_chosen_once_for_all_cases():
     """The mesh of a sweep is chosen once and stored with its work; twice as long cells meet four times the tolerance."""
     sizes = []
     for tolerance in (1e-3, 4e-3):
-        scene = SweepScene(Path("a.toml"), f"{PATCH}[accuracy]\ntolerance = {tolerance}\n")
-        work = choose_shared_meshes(WorkerData(scene, WORK.cases))
-        assert choose_shared_meshes(work) is work
+        scene = SweepScene(Path("a.toml"), f"{PATCH}{MOTION}[accuracy]\ntolerance = {tolerance}\n")
+        work = prepare_work(WorkerData(scene, WORK.cases))
         ((finest, *_),) = work.meshes.meshes.values()
         sizes.append(finest[0].x.size)
     assert sizes[0] / sizes[1] == pytest.approx(2, rel=0.1)

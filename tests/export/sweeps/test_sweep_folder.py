@@ -8,13 +8,14 @@ import pytest
 import xarray as xr
 from command_line import run_cli, run_successfully
 from computed_cases import ComputedCases
-from scene_texts import COULOMB, POINT, SHORT
+from scene_texts import COULOMB, POINT, SHORT, SMALL_PATCH
 from sweep_tables import assert_same_files, make_table, read_rows
 
 from patchfem.export import store
 from patchfem.export.folder import Folder
 from patchfem.export.sweeps import store as store_chunks
 from patchfem.runs import CaseResults
+from patchfem.runs.batch import batches
 
 RIG = POINT + COULOMB + SHORT
 OVER = ("--over", "drive.acceleration=1 g..5 g:10", "--over", "normal.load=10 N..200 N:10,-1 N")
@@ -100,6 +101,37 @@ def test_exact_shards_give_same_files(swept, scene_file, tmp_path):
     run_successfully(*words, "-o", tmp_path / "shards", "--shard", "3/3")
     assert run_cli(*words, "-o", tmp_path / "shards", "--collect").code == 3
     assert_same_files(tmp_path / "shards", swept, TABLES)
+
+
+def test_exact_blocks_of_patches_do_not_depend_on_interruptions_and_shards(tmp_path, monkeypatch):
+    """Static patches are computed in fixed blocks, so that resumed and divided sweeps end with the same files."""
+    monkeypatch.setattr(batches.static, "CASES_PER_BLOCK", 3)
+    scene = tmp_path / "patch.toml"
+    scene.write_text(SMALL_PATCH.replace('element_size = "0.5 mm"\n', ""))
+    over = (
+        "--over",
+        "contact.load=20 N..300 N:10",
+        "--over",
+        "contact.coating.thickness=0.1 mm,0.2 mm",
+    )
+    words = ("sweep", scene, *over, "--keep", "none", "--no-page")
+    run_successfully(*words, "-o", tmp_path / "whole")
+
+    computed = ComputedCases(monkeypatch)
+    computed.chunks_before_interrupt = 3
+    assert run_cli(*words, "-o", tmp_path / "resumed").code == 130
+    computed.chunks_before_interrupt = np.inf
+    n_before = len(computed)
+    run_successfully(*words, "-o", tmp_path / "resumed", "--resume")
+    assert 0 < n_before < len(computed) == 20
+
+    for shard in ("2/3", "1/3", "3/3"):
+        run_successfully(*words, "-o", tmp_path / "shards", "--shard", shard)
+    run_successfully(*words, "-o", tmp_path / "shards", "--collect")
+    for name in ("resumed", "shards"):
+        assert_same_files(
+            tmp_path / name, tmp_path / "whole", ("sweep.csv", "sweep.nc", "sweep.json")
+        )
 
 
 def test_exact_interrupted_sweep_that_is_run_anew_is_named(scene_file, tmp_path):

@@ -140,13 +140,18 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "rig": "`[drive]` with `[friction]` or `[[structure.interface]]`",
     "load on a point": "`[normal]`",
     "single contact point": "in a rig: `[normal]`",
-    "drive other than a sine": "`drive.waveform` other than `sine`, unless `drive.kind` is `free`",
-    "levels or sweep in time": "`drive.waveform` is `levels` or `sweep`, and `accuracy.method` is not `harmonic`",
+    "drive other than a sine": "`drive.kind` is `free`, or `drive.waveform` is not `sine`",
     "sensor apart from the output": "`accelerometer` or `gauge` of a `[[structure.mode]]` differs from its `output`",
+    "output that bounds the motion": "`structure.travel`, `structure.stiffening`, `drive.kind` is `free`, or "
+    "`drive.waveform` is `levels` or, unless `accuracy.method` is `harmonic`, `sweep`",
+    "joint without a single stiffness": "`structure.masses`, `structure.reduced`, `structure.bonded.wavelength`, grooves, "
+    "`normal.amplitude`, a mode with heave, pitch or yaw, or `[structure.interface.contact]`",
+    "nonlinear asperities": "`patch.asperities.law` is `exponential` or `hertz`",
     "mode with heave or pitch": "`normal` or `pitch` of a `[[structure.mode]]` is not 0, or `structure.normal_at` or "
     "`structure.pitch_at` is given",
     "changing load": "in a rig: `normal.amplitude`, or a mode with heave or pitch",
     "mode with yaw": "`yaw` of a `[[structure.mode]]` is not 0",
+    "memory of the slip": "a law with stretch or bonds, or partial slip",
     "kinetic below static": "law that sticks rigidly, with `kinetic` less than `static`",
     "no friction": "`static = 0`",
     "bonds of a given stiffness": "`stiffness` of a law that takes `bond_length` in its place",
@@ -166,7 +171,6 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "interface": "`[[structure.interface]]`",
     "several interfaces": "at least two `[[structure.interface]]`",
     "patch of an interface": "`[structure.interface.contact]`",
-    "patches of interfaces": "`[structure.interface.contact]` in any interface",
 }  # fmt: skip
 METHOD_COLUMNS = tuple(
     SceneColumn(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS

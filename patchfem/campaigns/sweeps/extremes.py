@@ -1,0 +1,165 @@
+"""Smallest or largest value of a measure inside the range of a swept key, and where it lies.
+
+It is the vertex of the parabola through the extreme case and its neighbours, over the logarithm of a key whose values are
+spaced by factors.
+"""
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from .sweep_table import SweepTable
+
+MIN_CASES_OF_EXTREME = 3  # cases with a value, of which one lies between two others
+EXTREME_BAND = 0.05  # relative distance from an extreme value that is commonly called negligible
+
+
+class Extreme(NamedTuple):
+    """Extreme value of a measure over a swept key, in SI.
+
+    Attributes
+    ----------
+    measure, key, unit : str
+        Names of measure and key, and unit of the key.
+    is_largest : bool
+        Whether it is the largest value, and not the smallest one.
+    value : float
+        Value of the measure.
+    place : float
+        Value of the key.
+    interval : tuple of float
+        Smallest and largest value of the key between which the extreme lies.
+    band : tuple of float
+        Values of the key between which the measure differs from its extreme by at most EXTREME_BAND; an end of the sweep
+        where it does not leave this band.
+    """
+
+    measure: str
+    key: str
+    unit: str
+    is_largest: bool
+    value: float
+    place: float
+    interval: tuple[float, float]
+    band: tuple[float, float]
+
+
+def find_extreme(table: SweepTable, name: str) -> Extreme | None:
+    """Find the extreme value of a measure between the ends of the only key that varies.
+
+    Parameters
+    ----------
+    table : SweepTable
+        Results of the sweep.
+    name : str
+        Name of the measure.
+
+    Returns
+    -------
+    Extreme or None
+        None if the measure is monotonic within its errors, or if no single number varies.
+    """
+    varied = [key for key in table.keys if key.count > 1]
+    values = table.select_trusted(name)
+    known = np.flatnonzero(np.isfinite(values))
+    if len(varied) != 1 or not varied[0].is_number or known.size < MIN_CASES_OF_EXTREME:
+        return None
+    (key,) = varied
+    known = known[np.argsort(key.values[known])]
+    x = np.log(key.values[known]) if key.is_logarithmic else key.values[known]
+    y = values[known]
+    error = np.nan_to_num(table.measures[name].errors[known]).astype(float)
+
+    # The extreme case exceeds both ends by more than the errors. Of a maximum and a minimum, the one that stands out more
+    # counts.
+    best = 0.0
+    for sign in (1.0, -1.0):
+        case = int(np.argmax(sign * y))
+        excess = sign * (y[case] - y[[0, -1]]) - error[case] - error[[0, -1]]
+        if excess.min() > best:
+            best = excess.min()
+            top = case
+            top_sign = sign
+    if not best:
+        return None
+
+    place, value = _find_vertex(x[top - 1 : top + 2], y[top - 1 : top + 2])
+    ends = _find_interval(x, y, error, top)
+    band = _find_band(x, y, top, value)
+    to_key = np.exp if key.is_logarithmic else float
+    return Extreme(
+        measure=name,
+        key=key.key,
+        unit=key.unit,
+        is_largest=top_sign > 0,
+        value=value,
+        place=float(to_key(place)),
+        interval=(float(to_key(ends[0])), float(to_key(ends[1]))),
+        band=(float(to_key(band[0])), float(to_key(band[1]))),
+    )
+
+
+def _find_vertex(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Return place and value of the vertex of the parabola through three points, x (3,) increasing and y (3,).
+
+    Without a vertex between the outer points it is the middle one.
+    """
+    slopes = np.diff(y) / np.diff(x)
+    curvature = (slopes[1] - slopes[0]) / (x[2] - x[0])
+    if curvature:
+        place = (x[0] + x[1]) / 2 - slopes[0] / (2 * curvature)
+        if x[0] <= place <= x[2]:
+            value = y[0] + (place - x[0]) * (slopes[0] + curvature * (place - x[1]))
+            return float(place), float(value)
+    return float(x[1]), float(y[1])
+
+
+def _find_interval(
+    x: np.ndarray, y: np.ndarray, error: np.ndarray, top: int
+) -> tuple[float, float]:
+    """Return the ends between which an extreme lies, at most the neighbours of the extreme case.
+
+    They follow from the errors of the three cases, and from the parabola through every second case, whose vertex is
+    farther from the extreme. Without such cases the parabola may be wrong by half the distance of the neighbours.
+
+    Parameters
+    ----------
+    x, y, error : (m,) array
+        Places, values and errors of the cases, x increasing.
+    top : int
+        Index of the extreme case.
+    """
+    near = slice(top - 1, top + 2)
+    place, _ = _find_vertex(x[near], y[near])
+    places = [place]
+    for signs in product((-1.0, 1.0), repeat=3):
+        places.append(_find_vertex(x[near], y[near] + np.array(signs) * error[near])[0])
+
+    slack = (x[top + 1] - x[top - 1]) / 4
+    if 2 <= top < x.size - 2:
+        wide = slice(top - 2, top + 3, 2)
+        slack = abs(_find_vertex(x[wide], y[wide])[0] - place)
+    low = max(min(places) - slack, x[top - 1])
+    high = min(max(places) + slack, x[top + 1])
+    return float(low), float(high)
+
+
+def _find_band(x: np.ndarray, y: np.ndarray, top: int, value: float) -> tuple[float, float]:
+    """Return the ends of the places around an extreme case, `top`, where y differs from `value` by at most EXTREME_BAND.
+
+    `x` (m,) are increasing places with values `y` (m,), between which y is interpolated linearly.
+    """
+    change = np.abs(y - value) - EXTREME_BAND * abs(value)
+    ends = []
+    for step in (-1, 1):
+        k = top
+        while 0 <= k + step < x.size and change[k + step] <= 0:
+            k += step
+        end = x[k]
+        if 0 <= k + step < x.size:
+            # An extreme case may itself lie outside the band of the vertex.
+            inside = min(change[k], 0.0)
+            end += (x[k + step] - x[k]) * inside / (inside - change[k + step])
+        ends.append(float(end))
+    return ends[0], ends[1]

@@ -1,0 +1,142 @@
+"""Loop over many cases of one mode and one point, their cycles and the pieces of their motion (compiled).
+
+A case moves by exact steps if its law is linear between events (`linear_cases_kernels`), and by Runge-Kutta steps if it
+is smooth (`smooth_cases_kernels`). A motion that repeats is not computed again up to its last cycles.
+"""
+
+from math import pi
+
+from ..compiled.flags_kernels import NJIT_KERNEL
+from ..compiled.jit import njit
+from . import linear_cases_kernels as linear
+from . import smooth_cases_kernels as smooth
+from .case_observers_kernels import (
+    N_READ,
+    add_piece,
+    end_cycle,
+    start_cycle,
+    start_window,
+)
+from .case_rows import SAME_CASE_CYCLE, SAME_SMOOTH_CYCLE, WINDOW_STEPS, Now, Number
+from .law_rows import Law
+
+
+@njit(**NJIT_KERNEL)
+def is_linear_law(law):
+    """Return whether a `Law` is linear between events."""
+    return law == Law.COULOMB or law == Law.JENKINS
+
+
+@njit(**NJIT_KERNEL)
+def count_repeated(cycle, same, before, case, now):
+    """Return the number of cycles that need not be computed because the last one ended as it began; 0 if it did not.
+
+    The last N_READ cycles are computed, because the measures are taken over them.
+
+    Parameters
+    ----------
+    cycle : int
+        Number of cycles that are computed.
+    same : float
+        Change of the cycle relative to the range of the motion, below which it repeats.
+    before, now : (18,) array
+        State of the case before and after the last cycle, in the order of `case_rows.Now`.
+    case : (12,) array
+        Numbers of the case, in the order of `case_rows.Number`.
+    """
+    size = same * (now[Now.MAX] - now[Now.MIN])
+    force = same * abs(case[Number.DRIVE]) / case[Number.MOBILITY]
+    if (
+        abs(now[Now.SLIDE] - before[Now.SLIDE]) > size
+        or abs(now[Now.VELOCITY] - before[Now.VELOCITY]) > case[Number.OMEGA] * size
+        or abs(now[Now.FORCE] - before[Now.FORCE]) > force
+    ):
+        return 0
+    return max(int(case[Number.CYCLES]) - N_READ - cycle, 0)
+
+
+@njit(cache=True, **NJIT_KERNEL)
+def march_cases(steps, parameters, law, nows, seens, histories, loops):
+    """March cases over their cycles.
+
+    Parameters
+    ----------
+    steps : int
+        Fewest steps per cycle.
+    parameters : (c, 12) array
+        Numbers of the cases, in the order of `case_rows.Number`.
+    law : ((k, c) array, (l, c) array)
+        Numbers of the laws, of which row 0 is the `Law`, and their memory (changed in place).
+    nows : (c, 2, 18) array
+        States of the cases, and before the last cycle, in the order of `case_rows.Now` (output).
+    seens : (c, 20) array
+        What was observed, in the order of `case_rows.Seen` (output).
+    histories : (c, n, 4) array
+        Extremes and phasor of every cycle (output).
+    loops : (c, 1 + w, 5) array
+        Cycles of the window, in the order of `case_rows.Loop`, after a row for those before it. Cycles that are not
+        measured keep their values (output).
+    """
+    numbers, memory = law
+    for j in range(parameters.shape[0]):
+        case = parameters[j]
+        now = nows[j, 0]
+        before = nows[j, 1]
+        seen = seens[j]
+        is_linear = is_linear_law(numbers[0, j])
+        same = SAME_CASE_CYCLE if is_linear else SAME_SMOOTH_CYCLE / float(steps) ** 3
+
+        # State at the start
+        point = linear.make_point(case, numbers, j)
+        block = linear.make_block(case, point, float(steps), 1.0)
+        body = smooth.make_body(case, law, j, float(steps))
+        now[Now.SLIDE] = case[Number.SLIDE]
+        now[Now.VELOCITY] = case[Number.VELOCITY]
+        now[Now.STORED] = 0.5 * (
+            now[Now.VELOCITY] ** 2 + case[Number.STIFFNESS] * now[Now.SLIDE] ** 2
+        )
+        if is_linear:
+            linear.start(block, now)
+        else:
+            smooth.start(body, now)
+
+        n_cycles = int(case[Number.CYCLES])
+        first = n_cycles - int(case[Number.WINDOW])
+        cycle = 0
+        while cycle < n_cycles:
+            observes = cycle >= first
+            if cycle == first:
+                start_window(now, seen)
+                block = linear.make_block(case, point, float(steps), WINDOW_STEPS)
+            for k in range(now.shape[0]):
+                before[k] = now[k]
+            loop = loops[j, max(loops.shape[1] - n_cycles + cycle, 0)]
+            start_cycle(now, seen, loop)
+
+            left = 2 * pi / case[Number.OMEGA]
+            n_events = 0
+            while left > 0:
+                if is_linear:
+                    piece = linear.advance(block, left, n_events, observes, now, seen)
+                    n_events = n_events + 1 if piece.duration < block.step else 0
+                else:
+                    piece = smooth.advance(body, left, observes, now, seen)
+                add_piece(piece, case, now, loop)
+                left -= piece.duration
+            end_cycle(case, now, seen, loop, histories[j, cycle])
+            cycle += 1
+
+            # A motion that repeats goes on with the last cycles.
+            n_repeated = 0 if observes else count_repeated(cycle, same, before, case, now)
+            if n_repeated > 0:
+                for k in range(cycle, cycle + n_repeated):
+                    for column in range(4):
+                        histories[j, k, column] = histories[j, cycle - 1, column]
+                for k in range(Now.WORK_IN, Now.STORED):
+                    now[k] += n_repeated * (now[k] - before[k])
+                cycle += n_repeated
+                first = cycle
+
+        now[Now.ELASTIC] = smooth.read(numbers, memory, j, case[Number.LOAD]).energy
+        if is_linear and point.stiffness > 0:
+            now[Now.ELASTIC] = 0.5 * now[Now.FORCE] ** 2 / point.stiffness

@@ -1,0 +1,149 @@
+"""Static patches that differ in numbers alone, solved together.
+
+In: `SimilarModels` of a pressed patch. Out: `CaseResults`, as from single runs, without the change between plane strain
+and plane stress.
+"""
+
+from __future__ import annotations
+
+from time import process_time
+
+import numpy as np
+
+from ...core import Measure, Outcome, compute_allowed_error
+from ...model.model import Model
+from ...model.similar_models import SimilarModels
+from .. import findings
+from ..patch import case_meshes, measures, result, strength
+from ..patch.cases import Batch, OutcomeCode
+from ..results.patch_rows import PATCH_TABLE
+from ..results.result import Advice, shorten_file_names
+from .case_results import FAILED_OUTCOME, CaseResults, has_unreadable_measurements
+
+# Number of consecutive cases of a sweep that are solved together. Their meshes depend on all of them, so that it is fixed.
+CASES_PER_BLOCK = 4096
+OUTCOMES = {
+    OutcomeCode.DONE: str(Outcome.DONE),
+    OutcomeCode.NO_CONTACT: str(Outcome.NO_CONTACT),
+    OutcomeCode.NOT_CONVERGED: str(Outcome.NOT_CONVERGED),
+    OutcomeCode.FAILED: FAILED_OUTCOME,
+}
+
+
+def can_solve(model: Model) -> bool:
+    """Return whether similar models of `model` are solved together.
+
+    Single runs treat faces, measured profiles and mesh files, and state what they neglect between unlike pieces, at
+    rounded ends and for the asperities of a trace.
+    """
+    if model.kind != "patch" or has_unreadable_measurements(model):
+        return False
+    patch = model.patch
+    return (
+        patch.area is None
+        and patch.gap.profile is None
+        and patch.mesh.file is None
+        and patch.pieces.are_alike
+        and patch.pieces.lower.end.kind != "radius"
+        and getattr(patch.interface.skin, "rms_height", None) is None
+    )
+
+
+def solve(models: SimilarModels) -> CaseResults:
+    """Compute the case results of similar models of a pressed patch."""
+    begin = process_time()
+    model = models.first
+    patch = models.columns().patch
+    batch = case_meshes.solve_cases(patch, len(models), model.accuracy.tolerance)
+
+    results = CaseResults.blank(len(models))
+    results.values.update(batch.values)
+    results.errors.update(batch.errors)
+    results.floors.update(batch.floors)
+    results.units.update({name: PATCH_TABLE[name].unit for name in batch.values})
+    for code, outcome in OUTCOMES.items():
+        results.outcome[batch.outcome == code] = outcome
+    for case, error in batch.messages.items():
+        results.messages[case] = str(error)
+    if batch.values:
+        _insert_texts(model, batch, results)
+        _insert_findings(model, batch, results)
+    results.seconds[:] = (process_time() - begin) / len(models)
+    return results
+
+
+def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
+    """Store settings, reasons of missing values, warnings and notes of the cases of a batch.
+
+    `model` is one of the models, with the texts that all of them have in common.
+    """
+    patch = model.patch
+    for count in np.unique(batch.n_nodes):
+        results.numerics[batch.n_nodes == count] = {"interface_nodes": int(count)}
+    reason = "; or ".join(measures.list_unbounded_pressure_reasons(patch))
+    for name in measures.PRESSURE_PEAK_MEASURES:
+        is_unbounded = np.isnan(batch.values[name]) & (batch.outcome != OutcomeCode.FAILED)
+        if is_unbounded.any():
+            row = PATCH_TABLE[name]
+            missing = Measure(None, row.unit, None, row.floor, reason=reason)
+            results.fill(np.flatnonzero(is_unbounded), {name: missing})
+
+    # Texts that all cases have in common
+    path = model.source.path
+    warnings = shorten_file_names([*model.source.remarks, *result.warn_of_locking(patch)], path)
+    notes = shorten_file_names(model.source.notes, path)
+    if assumption := measures.describe_assumed_plane_state(patch.pieces):
+        notes.append(f"{assumption}; the run of a single case states how much the two differ")
+    results.warnings[batch.outcome != OutcomeCode.FAILED] = warnings
+    results.notes[batch.outcome != OutcomeCode.FAILED] = notes
+
+    # Those of single cases; if the largest pressure and approach cause none, no other case has any.
+    peak = measures.PRESSURE_PEAK_MEASURES[0]
+    peaks = np.nan_to_num(batch.values[peak])
+    certain = peaks - np.nan_to_num(batch.errors[peak])
+    approaches = np.nan_to_num(batch.values["approach"])
+    is_own = batch.outcome == OutcomeCode.NO_CONTACT
+    if result.warn_of_strains(patch, peaks.max(), approaches.max()) or (
+        strength.note_on_yielding_faces(patch, certain.max())
+    ):
+        is_own[:] = batch.outcome != OutcomeCode.FAILED
+    for case in np.flatnonzero(is_own).tolist():
+        own = result.warn_of_strains(patch, peaks[case], approaches[case])
+        if batch.outcome[case] == OutcomeCode.NO_CONTACT:
+            own.append(Outcome.NO_CONTACT.sentence)
+        results.warnings[case] = [*warnings, *own]
+        yielding = strength.note_on_yielding_faces(patch, certain[case])
+        results.notes[case] = [*notes, *yielding.values()]
+
+
+def _insert_findings(model: Model, batch: Batch, results: CaseResults) -> None:
+    """Store why cases miss their tolerance, with the measure that misses it most; `model` has the tolerance."""
+    names = list(batch.values)
+    tolerance = model.accuracy.tolerance
+    ratios = np.zeros((len(names), len(results)))
+    for row, name in zip(ratios, names):
+        allowed = compute_allowed_error(tolerance, batch.values[name], batch.floors[name])
+        np.divide(batch.errors[name], allowed, out=row, where=allowed > 0)
+    ratios = np.nan_to_num(ratios)
+
+    is_missed = (ratios > 1).any(axis=0) & (batch.outcome != OutcomeCode.FAILED)
+    for case in np.flatnonzero(is_missed).tolist():
+        excess = {name: ratio for name, ratio in zip(names, ratios[:, case]) if ratio > 1}
+        missed = {
+            name: Measure(
+                batch.values[name][case], PATCH_TABLE[name].unit, batch.errors[name][case]
+            )
+            for name in excess
+        }
+        advice = f"a finer mesh does not reduce it or is too expensive; {findings.USE_ERROR_ADVICE}"
+        if not model.patch.mesh.is_automatic:
+            advice = f"leave out {findings.ELEMENT_SIZE_KEY}"
+        elif batch.excess[case] <= 1:
+            finer = findings.PROPOSED_TOLERANCE_RATIO * tolerance
+            advice = f"set accuracy.tolerance = {finer:.3g} for a finer mesh"
+        cause = f"the mesh ({batch.n_nodes[case]} interface nodes) causes this error; "
+        finding = findings.Missed(None, (), model, missed, excess).make_finding(
+            Advice(cause + advice)
+        )
+        results.findings[case] = finding.sentence
+        results.warnings[case] = [*results.warnings[case], finding.sentence]

@@ -1,0 +1,384 @@
+"""Static measures of many cases of a patch, on meshes that the cases share.
+
+In: a `PatchModel` whose loading and gap shapes may contain arrays, and a tolerance. Out: a `Batch`. The cases are pressed
+together on nested meshes. Those that miss the tolerance go on with the next mesh. When this would be too expensive, they
+are divided by the ends of their contacts, and each part gets meshes that are graded to its own contacts. A case
+that is alone has the meshes of a single run, which ends with its tolerance or with the limit of the mesh.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...contact.press_cases import MAX_CHUNK_VALUES
+from ...core import PatchfemError
+from . import grids, mesh_levels
+from .cases import Batch, CaseMeasures, Cases, make_cases, take_patch
+from .condensed import CondensedPair, condense
+from .measures import (
+    MeshValues,
+    collect_mesh_values,
+    estimate_static_measures,
+    max_mesh_error_ratio,
+)
+from .press import Level, PressedCases, make_level, press_on_level
+from .values import find_contact_edges
+
+# Largest number of contacts for which the meshes of many cases are graded: half of them equally spaced in the order of
+# their left ends, half in that of their right ends
+MAX_GRADED_CONTACTS = 48
+MAX_SEARCHED_CASES = (
+    256  # largest number of cases whose contacts are searched for before the meshes are chosen
+)
+# Largest number of interface nodes of meshes that many cases share; a finer mesh slows down every case
+MAX_SHARED_NODES = 500
+# Number of contact sets beyond which a table is emptied between two parts of the cases; of 500 nodes, 0.1 GB
+MAX_TABLE_SETS = 6000
+
+
+class ContactPlaces(NamedTuple):
+    """Where n contacts begin and end along the interface, independent of a mesh.
+
+    - begins (n,): whether the first node is in contact.
+    - crossings (n, e): positions [m] at which contact begins or ends, by increasing x; NaN beyond the last one.
+    """
+
+    begins: np.ndarray
+    crossings: np.ndarray
+
+    def take(self, rows) -> "ContactPlaces":
+        """Return selected contacts; `rows` are indices or a mask (n,)."""
+        return ContactPlaces(self.begins[rows], self.crossings[rows])
+
+    def find_sets(self, x) -> np.ndarray:
+        """Return the contact sets (n, m) of nodes at ascending positions x (m,) [m]."""
+        counts = np.zeros((len(self.begins), x.size), np.int64)
+        for crossing in self.crossings.T:
+            counts += crossing[:, None] < x
+        return (counts % 2 == 1) ^ self.begins[:, None]
+
+
+def find_contact_places(pressed: PressedCases) -> ContactPlaces:
+    """Return where the contacts of pressed cases without strips begin and end."""
+    edges = find_contact_edges(pressed)
+    x = pressed.x
+    crossings = x[edges.node] + edges.fraction * (x[edges.node + edges.side] - x[edges.node])
+    return ContactPlaces(pressed.active[:, 0], np.where(edges.exists, crossings, np.nan))
+
+
+def find_outer_nodes(pressed: PressedCases) -> np.ndarray:
+    """Return the positions (n, 2) [m] of the first and the last node in contact."""
+    active = pressed.active
+    last = active.shape[1] - 1 - active[:, ::-1].argmax(axis=1)
+    return pressed.x[np.stack([active.argmax(axis=1), last], axis=1)]
+
+
+def join_places(parts: list[ContactPlaces]) -> ContactPlaces:
+    """Return the contacts of several parts of the cases one after the other."""
+    counts = [part.crossings.shape for part in parts]
+    crossings = np.full((sum(n for n, _ in counts), max(e for _, e in counts)), np.nan)
+    first = 0
+    for part, (n_contacts, n_crossings) in zip(parts, counts):
+        crossings[first : first + n_contacts, :n_crossings] = part.crossings
+        first += n_contacts
+    return ContactPlaces(np.concatenate([part.begins for part in parts]), crossings)
+
+
+class PressedParts(NamedTuple):
+    """Cases that are pressed on one mesh.
+
+    - values: their measures on the mesh.
+    - places: where their contacts begin and end.
+    - is_missing (k,): cases that miss the tolerance, or all if it is not judged; those that fail are left out.
+    """
+
+    values: MeshValues
+    places: ContactPlaces
+    is_missing: np.ndarray
+
+
+def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
+    """Compute the static measures of all cases of a group, with errors within the tolerance if possible.
+
+    A case that cannot be solved, or misses the tolerance, has a reason (`cases.Reason`); it never stops the others.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch of all cases; numbers of its loading and of its gap shapes may be arrays (n,), except the position of a step.
+    count : int
+        Number n of cases.
+    tolerance : float
+        Relative error that the static measures have to meet.
+
+    Returns
+    -------
+    Batch
+    """
+    solver = _CaseSolver(patch_model, make_cases(patch_model, count), tolerance)
+    if count == 1:
+        for number in range(count):
+            solver.solve_alone(number)
+    elif patch_model.mesh.is_automatic:
+        solver.solve(np.arange(count))
+    else:
+        solver.solve_on_given_meshes()
+    return solver.batch
+
+
+class _CaseSolver:
+    """Solution of the cases of a group on meshes that are chosen for them.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch of all cases, whose numbers may be arrays.
+    cases : Cases
+        The same cases as columns.
+    tolerance : float
+        Relative error of the static measures.
+    """
+
+    def __init__(self, patch_model, cases: Cases, tolerance: float):
+        self.patch_model = patch_model
+        self.cases = cases
+        self.tolerance = tolerance
+        self.batch = Batch.blank(cases.n_cases)
+        self.ends = np.zeros(
+            (cases.n_cases, 2)
+        )  # positions [m] of the first and last node in contact
+
+    def solve(self, numbers: np.ndarray) -> None:
+        """Solve some cases (k,) on common meshes, and those that miss the tolerance on meshes of their own."""
+        if numbers.size < 2:
+            for number in numbers.tolist():
+                self.solve_alone(number)
+            return
+        missing = self._solve_together(numbers)
+        if not missing.size:
+            return
+        # Cases whose contacts end at similar places get common meshes: the ends that differ most are sorted
+        ends = self.ends[missing]
+        side = np.ptp(ends, axis=0).argmax()
+        for part in np.array_split(missing[np.argsort(ends[:, side], kind="stable")], 2):
+            self.solve(part)
+
+    def solve_alone(self, number: int) -> None:
+        """Solve one case like a single run."""
+        try:
+            fine, *_ = mesh_levels.solve_with_coarser(
+                take_patch(self.patch_model, number), self.tolerance
+            )
+        except PatchfemError as error:
+            self.batch.fail(number, error)
+            return
+        measures = fine.measures.values()
+        columns = [[one.value for one in measures], [one.error for one in measures]]
+        columns += [[one.floor for one in measures]]
+        values, errors, floors = np.array(columns, float)[:, :, None]
+        excess = np.array([max_mesh_error_ratio(fine.measures, self.tolerance)])
+        found = CaseMeasures(tuple(fine.measures), values, errors, floors, excess)
+        self.batch.put(np.array([number]), found, fine.x.size)
+
+    def _solve_together(self, numbers: np.ndarray) -> np.ndarray:
+        """Solve cases (k,) on common meshes; return the numbers of those that miss the tolerance.
+
+        Each further mesh halves the cells for the cases that miss the tolerance on the one before.
+        """
+        search = _ContactSearch(self.patch_model, self.cases.take(numbers), numbers)
+        layout, contact = grids.search_layout(self.patch_model, search.find_contacts)
+        # Nothing is loaded, or no case can be pressed; the single runs tell why
+        if contact is None:
+            for number in numbers.tolist():
+                self.solve_alone(number)
+            return numbers[:0]
+
+        bodies = grids.make_grids(self.patch_model, layout)
+        places = search.guess_places()
+        series: list[MeshValues] = []
+        while True:
+            pair = condense(self.patch_model, *bodies, keep_factors=False)
+            is_judged = len(series) >= grids.MIN_NESTED_MESHES - 1
+            values, places, is_missing = self._press_parts(
+                numbers, pair, places, series, is_judged=is_judged
+            )
+            series = [*series, values]
+
+            bodies = [body.refine() for body in bodies]
+            is_last = bodies[0].x.size > MAX_SHARED_NODES
+            is_last |= mesh_levels.is_too_expensive(self.patch_model, bodies)
+            if is_judged and (is_last or not is_missing.any()):
+                return numbers[is_missing]
+            numbers = numbers[is_missing]
+            series = [mesh.take(is_missing) for mesh in series]
+            places = places.take(is_missing)
+
+    def solve_on_given_meshes(self) -> None:
+        """Solve all cases on the meshes that the scene prescribes."""
+        numbers = np.arange(self.cases.n_cases)
+        places = None
+        series: list[MeshValues] = []
+        levels = mesh_levels.make_given_meshes(self.patch_model)
+        for bodies in reversed(levels):
+            pair = condense(self.patch_model, *bodies, keep_factors=False)
+            is_judged = len(series) == len(levels) - 1
+            values, places, _ = self._press_parts(
+                numbers, pair, places, series, is_judged=is_judged
+            )
+            series = [*series, values]
+
+    def _press_parts(
+        self, numbers: np.ndarray, pair: CondensedPair, places, series, *, is_judged: bool
+    ) -> PressedParts:
+        """Press cases on a mesh, in parts that limit the memory.
+
+        Parameters
+        ----------
+        numbers : (k,) ndarray
+            Numbers of the cases.
+        pair : CondensedPair
+            Pieces on the mesh.
+        places : ContactPlaces or None
+            Contacts of the cases on the mesh before.
+        series : list of MeshValues
+            Measures of the cases on the meshes before, from coarse to fine.
+        is_judged : bool
+            Whether the measures are kept with their errors.
+
+        Returns
+        -------
+        PressedParts
+        """
+        level = make_level(self.patch_model, pair)
+        is_missing = np.ones(numbers.size, bool)
+        values = []
+        found_places = []
+        for rows in _split_rows(numbers.size, level):
+            cases = self.cases.take(numbers[rows])
+            start = np.zeros((rows.size, level.x.size), bool)
+            if places is not None:
+                start = places.take(rows).find_sets(level.x)
+            pressed, errors = press_on_level(level, cases, start)
+            values.append(collect_mesh_values(pressed))
+            found_places.append(find_contact_places(pressed))
+            self.ends[numbers[rows]] = find_outer_nodes(pressed)
+            if is_judged:
+                own = [*(mesh.take(rows) for mesh in series), values[-1]]
+                is_missing[rows] = self._keep_measures(numbers[rows], pressed, own, errors)
+            for row, error in errors.items():
+                is_missing[rows[row]] = False
+                self.batch.fail(int(numbers[rows[row]]), error)
+            level.limit_sets(MAX_TABLE_SETS)
+        return PressedParts(join_mesh_values(values), join_places(found_places), is_missing)
+
+    def _keep_measures(self, numbers, pressed: PressedCases, series, errors) -> np.ndarray:
+        """Estimate the errors of cases, and keep their measures; return whether they miss the tolerance (k,).
+
+        Parameters
+        ----------
+        numbers : (k,) ndarray
+            Numbers of the cases.
+        pressed : PressedCases
+            The cases on the finest mesh.
+        series : list of MeshValues
+            Their measures on all meshes from coarse to fine.
+        errors : dict
+            Errors of the cases that could not be pressed, by their rows.
+        """
+        mesh = self.patch_model.mesh
+        length = self.patch_model.pieces.length
+        estimates = estimate_static_measures(
+            pressed, series, self.tolerance if mesh.is_automatic else None
+        )
+        excess = estimates.excess(self.tolerance, length)
+        found = CaseMeasures(
+            estimates.names,
+            estimates.values,
+            estimates.errors,
+            estimates.floors(self.tolerance, length),
+            excess,
+        )
+        is_solved = np.ones(len(pressed), bool)
+        is_solved[list(errors)] = False
+        self.batch.put(numbers[is_solved], found.take(is_solved), pressed.x.size)
+        return excess > 1
+
+
+class _ContactSearch:
+    """Search for the contacts of many cases, for which their meshes are graded.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch of all cases.
+    cases : Cases
+        n cases, of which MAX_SEARCHED_CASES are pressed: equally spaced ones in the order of their columns, and those with
+        extreme columns.
+    numbers : (n,) ndarray
+        Numbers of the cases in the model.
+    """
+
+    def __init__(self, patch_model, cases: Cases, numbers: np.ndarray):
+        self.patch_model = patch_model
+        self.columns = np.nan_to_num(np.column_stack([*cases.holders, cases.amplitudes]))
+        order = np.lexsort(self.columns.T[::-1])
+        even = np.linspace(0, cases.n_cases - 1, min(cases.n_cases, MAX_SEARCHED_CASES))
+        extreme = [*self.columns.argmin(axis=0), *self.columns.argmax(axis=0)]
+        self.rows = np.unique([*order[even.round().astype(int)], *extreme])
+        self.cases = cases.take(self.rows)
+        self.numbers = numbers[self.rows]
+        self.places: ContactPlaces | None = None
+
+    def find_contacts(self, pair: CondensedPair) -> list[grids.SolvedContact]:
+        """Return the contacts for which the next grid is graded, from the pieces on a grid."""
+        level = make_level(self.patch_model, pair)
+        start = np.zeros((self.cases.n_cases, level.x.size), bool)
+        if self.places is not None:
+            start = self.places.find_sets(level.x)
+        pressed, errors = press_on_level(level, self.cases, start)
+        self.places = find_contact_places(pressed)
+        is_loaded = pressed.load > 0
+        is_loaded[list(errors)] = False
+        contacts = []
+        for row in _spread_contacts(pressed.active, np.flatnonzero(is_loaded)):
+            model = take_patch(self.patch_model, self.numbers[row])
+            extent = grids.find_contact_extent(pressed, row)
+            contacts.append(grids.SolvedContact(model, [extent]))
+        return contacts
+
+    def guess_places(self) -> ContactPlaces:
+        """Return for each case the contact of the searched case whose numbers are nearest, relative to their ranges."""
+        scale = np.ptp(self.columns, axis=0)
+        scaled = self.columns / np.where(scale > 0, scale, 1.0)
+        distances = ((scaled[:, None] - scaled[self.rows]) ** 2).sum(axis=2)
+        return self.places.take(distances.argmin(axis=1))
+
+
+def _spread_contacts(active, rows: np.ndarray) -> list[int]:
+    """Select at most MAX_GRADED_CONTACTS of some contact sets, equally spaced in the order of their ends.
+
+    `active` (n, m) are contact sets, and `rows` (k,) the numbers of those that are selected from.
+    """
+    if rows.size <= MAX_GRADED_CONTACTS:
+        return rows.tolist()
+    even = np.linspace(0, rows.size - 1, MAX_GRADED_CONTACTS // 2).round().astype(int)
+    first = active[rows].argmax(axis=1)
+    last = active[rows, ::-1].argmax(axis=1)
+    orders = (np.argsort(place, kind="stable") for place in (first, last))
+    return np.unique([rows[order[even]] for order in orders]).tolist()
+
+
+def _split_rows(count: int, level: Level) -> list[np.ndarray]:
+    """Return the numbers of `count` cases in parts whose arrays of nodes on a level need little memory."""
+    size = max(1, MAX_CHUNK_VALUES // (level.x.size * (2 + len(level.shapes))))
+    return np.split(np.arange(count), range(size, count, size))
+
+
+def join_mesh_values(parts: list[MeshValues]) -> MeshValues:
+    """Return the measures of several parts of the cases on one mesh one after the other."""
+    return MeshValues(
+        parts[0].pair,
+        {name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values},
+        np.concatenate([part.n_intervals for part in parts]),
+        np.concatenate([part.end_pressure for part in parts]),
+    )

@@ -1,0 +1,302 @@
+"""Cases of a static patch as columns, and their solution: records with a leading case axis.
+
+In: a `PatchModel` in whose loading and gap shapes numbers may be arrays (n,). Out: `Cases` with the columns of the contact
+problem; `Batch` with the measures of all cases. `case_meshes.solve_cases` turns the one into the other. A case that is
+alone in its group is a single run.
+
+Letters of array shapes: n cases, p gap shapes, m interface nodes.
+"""
+
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import contact
+from ...contact.gaps import ShapeProperties
+from ...contact.press_cases import HolderCases
+from ...core import NotConverged, PatchfemError
+from ...model.gap import Gap
+from ...model.patch import PatchModel
+from ...scene.keys.types import Table
+from ..results.patch_rows import POSITIVE_MESH_MEASURES, Arrays
+
+
+class Reason(IntEnum):
+    """Code of a case in `Batch.reason`: why it has no values, or why they miss the tolerance.
+
+    - NONE: the case has values within the tolerance.
+    - MESH_LIMIT: the values are the best; their errors miss the tolerance, and a finer mesh would be too expensive.
+    - REFUSED: the load, the approach or the shapes cannot be computed with.
+    - NOT_CONVERGED: no contact set meets the contact conditions to round-off.
+    """
+
+    NONE = 0
+    MESH_LIMIT = 1
+    REFUSED = 2
+    NOT_CONVERGED = 3
+
+
+class OutcomeCode(IntEnum):
+    """Code of a case in `Batch.outcome`.
+
+    The first three are those of the `Outcome` of a run. FAILED cases have no values, and `Batch.reason` tells why.
+    """
+
+    DONE = 0
+    NO_CONTACT = 1
+    NOT_CONVERGED = 2
+    FAILED = 3
+
+
+class Cases(NamedTuple):
+    """Loads, prescribed motions and gap shapes of n patches with the same pieces, layer and mesh settings.
+
+    - holders: loads and prescribed motions of the holders.
+    - rotation (n,): rotation [rad] of the upper piece that the gap already contains.
+    - amplitudes (n, p): factors of the gap shapes of `make_gap_shapes`.
+    - half_steps (n,): half the height [m] of the step of each gap; None for gaps without a step.
+    """
+
+    holders: HolderCases
+    rotation: np.ndarray
+    amplitudes: np.ndarray
+    half_steps: np.ndarray | None
+
+    @property
+    def n_cases(self) -> int:
+        """Number n of cases."""
+        return len(self.amplitudes)
+
+    def take(self, rows) -> "Cases":
+        """Return selected cases; `rows` are indices or a mask (n,)."""
+        half_steps = self.half_steps if self.half_steps is None else self.half_steps[rows]
+        return Cases(
+            self.holders.take(rows), self.rotation[rows], self.amplitudes[rows], half_steps
+        )
+
+    @property
+    def variants(self) -> "list[tuple[float, Cases]]":
+        """Cases with a node at the step on its higher side (-1) and on its lower side (1); [] without a step."""
+        if self.half_steps is None:
+            return []
+        variants = []
+        for side in (-1.0, 1.0):
+            amplitudes = self.amplitudes.copy()
+            amplitudes[:, -1] = side * self.half_steps
+            variants.append((side, self._replace(amplitudes=amplitudes)))
+        return variants
+
+
+class _SplitGap(NamedTuple):
+    """Shapes of a gap in the order of their columns.
+
+    - scaled: (name, table, properties) of each shape that is proportional to a number of its table.
+    - rest: gap with all other shapes and the profile.
+    - has_rest: whether these, or rounded ends of the pieces, contribute to the gap.
+    """
+
+    scaled: list[tuple[str, Table, ShapeProperties]]
+    rest: Gap
+    has_rest: bool
+
+
+def _split_gap(patch_model: PatchModel) -> _SplitGap:
+    """Split the gap of a patch model into shapes with amplitudes and the rest."""
+    gap = patch_model.gap
+    scaled = []
+    fixed = []
+    for name, keys in gap.shapes:
+        properties = contact.gaps.SHAPE_PROPERTIES.get(name)
+        if properties is None or properties.amplitude is None:
+            fixed.append((name, keys))
+        else:
+            scaled.append((name, keys, properties))
+    has_round_ends = any(piece.end.kind == "radius" for piece in patch_model.pieces.both)
+    has_rest = bool(fixed) or gap.profile is not None or has_round_ends
+    return _SplitGap(scaled, replace(gap, shapes=tuple(fixed)), has_rest)
+
+
+def make_cases(patch_model: PatchModel, count: int) -> Cases:
+    """Return the cases of a patch model in which numbers of the loading and of the gap shapes may be arrays (n,).
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch of all cases. The position of a step is the same in all of them.
+    count : int
+        Number n of cases.
+    """
+    loading = patch_model.loading
+    spring = loading.rotational_stiffness
+    moment = None
+    if loading.can_rotate:
+        moment = loading.moment
+    elif np.any(np.greater(spring, 0.0)):
+        moment = 0.0
+
+    def fill(value) -> np.ndarray:
+        """Return a number, or an array (n,), as an array (n,); NaN for None."""
+        return np.broadcast_to(np.nan if value is None else np.asarray(value, float), count)
+
+    holders = HolderCases(
+        fill(loading.load),
+        fill(loading.approach),
+        fill(moment),
+        fill(spring),
+    )
+    # After the part that no case scales comes the change of a node at a step
+    split = _split_gap(patch_model)
+    amplitudes = [properties.amplitude(keys) for _, keys, properties in split.scaled]
+    heights = [keys.height for name, keys in patch_model.gap.shapes if name == "step"]
+    amplitudes += [1.0] * split.has_rest + [0.0] * bool(heights)
+    half_steps = np.abs(fill(heights[0])) / 2 if heights else None
+    return Cases(
+        holders,
+        fill(patch_model.gap.angle),
+        np.array([fill(value) for value in amplitudes]).reshape(len(amplitudes), count).T,
+        half_steps,
+    )
+
+
+def take_patch(patch_model: PatchModel, case: int) -> PatchModel:
+    """Return the patch model of one case, whose numbers are no arrays."""
+
+    def take(value):
+        """Return the number of the case."""
+        return float(value[case]) if isinstance(value, np.ndarray) else value
+
+    loading = patch_model.loading
+    numbers = {name: take(getattr(loading, name)) for name in loading.__dataclass_fields__}
+    shapes = []
+    for name, keys in patch_model.gap.shapes:
+        own = {key: take(value) for key, value in keys}
+        shapes.append((name, keys.model_copy(update=own)))
+    gap = replace(patch_model.gap, shapes=tuple(shapes))
+    return replace(patch_model, gap=gap, loading=replace(loading, **numbers))
+
+
+def make_gap_shapes(patch_model: PatchModel, x, end_gap) -> np.ndarray:
+    """Return the gap shapes (p, m) [m per unit amplitude] of a group of cases at the nodes of a mesh.
+
+    A table with a number that scales its shape gives a shape of unit amplitude. All other parts of the gap, if there are
+    any, are one shape. The last one, for gaps with a step, is 1 at a node on the edge of the step.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch of all cases.
+    x : (m,) ndarray
+        Positions [m].
+    end_gap : (m,) ndarray
+        Gap [m] due to the rounded ends of the pieces.
+    """
+    split = _split_gap(patch_model)
+    shapes = []
+    for name, keys, properties in split.scaled:
+        numbers = {key: value for key, value in keys if key != "on"} | dict(properties.unit)
+        shapes.append(getattr(contact.gaps, name)(x, **numbers))
+    if split.has_rest:
+        shapes.append(split.rest.evaluate(x).heights + end_gap)
+    edges = patch_model.gap.step_edges
+    if edges:
+        shapes.append(np.isin(x, edges).astype(float))
+    return np.array(shapes).reshape(-1, x.size)
+
+
+class CaseMeasures(NamedTuple):
+    """Measures of k cases on one mesh, as arrays (r, k) of r measures in SI units.
+
+    - names: names of the measures.
+    - values, errors, floors: NaN where there is none.
+    - excess (k,): largest ratio of error to allowed error of the measures that control the mesh.
+    """
+
+    names: tuple[str, ...]
+    values: np.ndarray
+    errors: np.ndarray
+    floors: np.ndarray
+    excess: np.ndarray
+
+    def take(self, rows) -> "CaseMeasures":
+        """Return selected cases; `rows` are indices or a mask (k,)."""
+        return CaseMeasures(self.names, *(column[..., rows] for column in self[1:]))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Batch:
+    """Static measures of n cases of a group.
+
+    - values, errors, floors {name: (n,)}: measures in SI units (`patch_rows.PATCH_TABLE`). A value is NaN where the case
+      failed or the measure is unbounded; an error is NaN without an estimate.
+    - excess (n,): largest ratio of error to allowed error of the measures for which the mesh is refined; above 1 the
+      case misses its tolerance, and a case that failed has inf.
+    - outcome (n,) of int8: `OutcomeCode`; reason (n,) of int8: `Reason`.
+    - n_nodes (n,): number of interface nodes of the finest mesh of each case.
+    - messages: error of each case that failed, by its number; a single run raises it.
+    """
+
+    values: Arrays
+    errors: Arrays
+    floors: Arrays
+    excess: np.ndarray
+    outcome: np.ndarray
+    reason: np.ndarray
+    n_nodes: np.ndarray
+    messages: dict[int, PatchfemError] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.excess)
+
+    @classmethod
+    def blank(cls, count: int) -> "Batch":
+        """Return a batch of cases that are not solved yet."""
+        return cls(
+            {},
+            {},
+            {},
+            np.full(count, np.inf),
+            np.full(count, OutcomeCode.FAILED, np.int8),
+            np.full(count, Reason.NOT_CONVERGED, np.int8),
+            np.zeros(count, int),
+        )
+
+    def put(self, numbers: np.ndarray, measures: CaseMeasures, n_nodes: int) -> None:
+        """Store measures of some cases whose errors are smaller than those that they have.
+
+        Parameters
+        ----------
+        numbers : (k,) ndarray
+            Numbers of the cases.
+        measures : CaseMeasures
+            Their measures on a mesh.
+        n_nodes : int
+            Number of interface nodes of the mesh.
+        """
+        rows = np.flatnonzero(measures.excess < self.excess[numbers])
+        cases = numbers[rows]
+        for columns, new in zip((self.values, self.errors, self.floors), measures[1:4]):
+            for name, row in zip(measures.names, new):
+                if name not in columns:
+                    columns[name] = np.full(len(self), np.nan)
+                columns[name][cases] = row[rows]
+
+        self.excess[cases] = measures.excess[rows]
+        self.n_nodes[cases] = n_nodes
+        self.reason[cases] = np.where(measures.excess[rows] > 1, Reason.MESH_LIMIT, Reason.NONE)
+        self.outcome[cases] = OutcomeCode.DONE
+        for name in POSITIVE_MESH_MEASURES:
+            is_unknown = (self.errors[name][cases] > 0) & (
+                self.errors[name][cases] >= self.values[name][cases]
+            )
+            self.outcome[cases[is_unknown]] = OutcomeCode.NOT_CONVERGED
+        is_open = ~(self.values["normal_load"][cases] > 0)
+        self.outcome[cases[is_open]] = OutcomeCode.NO_CONTACT
+
+    def fail(self, number: int, error: PatchfemError) -> None:
+        """Store the error of a case that has no measures yet."""
+        if np.isinf(self.excess[number]):
+            self.messages[number] = error
+            is_numerical = isinstance(error, NotConverged)
+            self.reason[number] = Reason.NOT_CONVERGED if is_numerical else Reason.REFUSED

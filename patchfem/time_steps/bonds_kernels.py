@@ -1,0 +1,195 @@
+"""Bonds that are summed by their moments: the nonlocal law of reading "stretch" and order 1, Dahl and LuGre (compiled).
+
+The force is mu z/eps_0 with the moments m, z and s2 of `friction.bonds.point_kernels`, which are exact over a step of
+constant bond length. Dahl's law has m_0 = 1 and eps_0 = mu N/stiffness, and the LuGre law moreover the bond length
+eps_0 g(v)/g(0), with Stribeck's curve g at the mean speed of the step, and the damping of bonds and lubricant.
+"""
+
+from math import exp
+
+from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_NO_REFCOUNT
+from ..compiled.jit import njit
+from ..friction.bonds.point_kernels import (
+    MAX_SERIES_PATH,
+    bond_mean,
+    bond_step,
+    grow,
+    press_point,
+    shape_functions,
+    shape_series,
+)
+from .step_rows_kernels import VECTOR, WIDTH, BondRow, Value
+
+MIN_LENGTH = 1e-9  # smallest bond length of the LuGre law relative to that at rest
+
+
+@njit(**NJIT_CALL)
+def slide_bonds(numbers, memory, trial, values, count, step):
+    """Slide a block of points of bonds; the package describes the arguments (`time_steps`)."""
+    # Bonds under a constant load and of a constant length need only the last loops.
+    has_changes = 0.0
+    longest = 0.0
+    n_lanes = (count + VECTOR - 1) // VECTOR * VECTOR
+    for j in range(n_lanes):
+        trial[j] = memory[j]
+        trial[WIDTH + j] = memory[WIDTH + j]
+        trial[2 * WIDTH + j] = memory[2 * WIDTH + j]
+        trial[3 * WIDTH + j] = memory[3 * WIDTH + j]
+        values[Value.END_BY_VELOCITY + j] = 0.0
+        values[Value.MEAN_BY_VELOCITY + j] = 0.0
+        has_changes += abs(values[Value.END_LOAD + j] - values[Value.START_LOAD + j])
+        has_changes += max(numbers[BondRow.GROWTH + j], 0.0) + numbers[BondRow.SPEED + j]
+    if has_changes > 0:
+        prepare_bonds(numbers, memory, trial, values, count, step)
+    for j in range(n_lanes):
+        longest = max(longest, abs(values[Value.SLIDE + j]) / trial[j])
+
+    # Short slides have no branch, so that this loop is vectorised.
+    if longest < MAX_SERIES_PATH:
+        for j in range(n_lanes):
+            move_bonds(
+                numbers, trial, values, j, shape_series(abs(values[Value.SLIDE + j]) / trial[j])
+            )
+    else:
+        for j in range(n_lanes):
+            path = abs(values[Value.SLIDE + j]) / trial[j]
+            move_bonds(numbers, trial, values, j, shape_functions(path))
+    if has_changes > 0:
+        finish_bonds(numbers, memory, trial, values, count, step)
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
+def move_bonds(numbers, trial, values, j, shapes):
+    """Move the bonds of point j along its slide; write forces, slopes, energy and stretch.
+
+    Parameters
+    ----------
+    numbers, trial, values : array
+        Numbers of the law, moments at the start of the slide, which are advanced to its end, and values of the block.
+    j : int
+        Number of the point.
+    shapes : ShapeFunctions
+        Shape functions of the slide in bond lengths.
+    """
+    slide = values[Value.SLIDE + j]
+    load = 0.5 * (values[Value.START_LOAD + j] + values[Value.END_LOAD + j])
+    stiffness = numbers[BondRow.FRICTION + j] / numbers[BondRow.LENGTH + j]
+    length = trial[j]
+    m = trial[WIDTH + j]
+    z = trial[2 * WIDTH + j]
+    mean = bond_mean(m, z, slide, load, length, shapes)
+    moved = bond_step((m, z, trial[3 * WIDTH + j]), slide, load, length, shapes)
+    direction = 1.0 if slide > 0 else -1.0
+    trial[WIDTH + j] = moved.m
+    trial[2 * WIDTH + j] = moved.z
+    trial[3 * WIDTH + j] = moved.s2
+    values[Value.END + j] = stiffness * moved.z
+    values[Value.MEAN + j] = stiffness * mean.mean
+    values[Value.MEAN_BY_SLIDE + j] = stiffness * mean.slope
+    values[Value.END_BY_SLIDE + j] = stiffness * (moved.m - direction * moved.z / length)
+    values[Value.ENERGY + j] = 0.5 * stiffness * moved.s2
+    values[Value.STRETCH + j] = moved.z / moved.m if moved.m > 0 else 0.0
+
+
+@njit(**NJIT_CALL)
+def find_length(numbers, j, velocity):
+    """Return the bond length [m] of point j at a velocity [m/s], which is constant for Dahl and nonlocal bonds."""
+    length = numbers[BondRow.LENGTH + j]
+    ratio = velocity / numbers[BondRow.SPEED + j]
+    kinetic = numbers[BondRow.KINETIC + j] / numbers[BondRow.FRICTION + j]
+    return length * max(kinetic + (1 - kinetic) * exp(-ratio * ratio), MIN_LENGTH)
+
+
+@njit(**NJIT_CALL)
+def prepare_bonds(numbers, memory, trial, values, count, step):
+    """Let the first half of the change of load act, and set the bond length in the middle of the step.
+
+    The arguments are those of `slide_bonds`; `trial` has the memory, and is changed.
+    """
+    for j in range(count):
+        start = values[Value.START_LOAD + j]
+        middle = 0.5 * (start + values[Value.END_LOAD + j])
+        if start != middle:
+            press_bonds(numbers, trial, j, start, middle)
+        if numbers[BondRow.SPEED + j] > 0:
+            speed = values[Value.START_VELOCITY + j]
+            if step.duration > 0:
+                speed = values[Value.SLIDE + j] / step.duration
+            trial[j] = find_length(numbers, j, speed)
+        elif numbers[BondRow.GROWTH + j] >= 0:
+            half = 0.5 * step.duration
+            v = values[Value.START_VELOCITY + j]
+            growth = numbers[BondRow.GROWTH + j : BondRow.INITIAL : WIDTH]
+            trial[j] = grow(memory[j], v, v, abs(v) * half, half, growth).length
+
+
+@njit(**NJIT_CALL)
+def press_bonds(numbers, trial, j, before, after):
+    """Change the load of point j at rest from `before` to `after` [N]; the moments in `trial` are changed.
+
+    Parameters
+    ----------
+    numbers, trial : array
+        Numbers of the law, bond lengths and moments of the block.
+    j : int
+        Number of the point.
+    before, after : float
+        Loads [N].
+    """
+    bonds = trial[WIDTH + j], trial[2 * WIDTH + j], trial[3 * WIDTH + j]
+    initial = numbers[BondRow.INITIAL + j]
+    pressed = press_point(bonds, before, after, initial, numbers[BondRow.LENGTH + j])
+    trial[WIDTH + j] = pressed.m
+    trial[2 * WIDTH + j] = pressed.z
+    trial[3 * WIDTH + j] = pressed.s2
+
+
+@njit(**NJIT_CALL)
+def finish_bonds(numbers, memory, trial, values, count, step):
+    """Let the second half of the change of load act, grow the bonds and add the damping of the LuGre law.
+
+    The arguments are those of `slide_bonds`; `trial` has the moments at the end of the slide, and is changed.
+    """
+    for j in range(count):
+        stop = values[Value.END_LOAD + j]
+        middle = 0.5 * (values[Value.START_LOAD + j] + stop)
+        stiffness = numbers[BondRow.FRICTION + j] / numbers[BondRow.LENGTH + j]
+        slide = values[Value.SLIDE + j]
+        velocity = values[Value.VELOCITY + j]
+        z = trial[2 * WIDTH + j]
+        if middle != stop:
+            press_bonds(numbers, trial, j, middle, stop)
+            values[Value.END + j] = stiffness * trial[2 * WIDTH + j]
+            values[Value.ENERGY + j] = 0.5 * stiffness * trial[3 * WIDTH + j]
+            values[Value.END_BY_SLIDE + j] *= trial[2 * WIDTH + j] / z if z != 0 else 1.0
+            m = trial[WIDTH + j]
+            values[Value.STRETCH + j] = trial[2 * WIDTH + j] / m if m > 0 else 0.0
+
+        if numbers[BondRow.SPEED + j] > 0:
+            length = find_length(numbers, j, velocity)
+            damping = numbers[BondRow.DAMPING + j]
+            viscous = numbers[BondRow.VISCOUS + j]
+            if step.duration > 0 and damping + viscous > 0:
+                m = 0.5 * (memory[WIDTH + j] + trial[WIDTH + j])
+                # The bonds are damped as the slide stretches them, not as a change of load breaks them.
+                bonds = memory[WIDTH + j], memory[2 * WIDTH + j], memory[3 * WIDTH + j]
+                start = press_point(
+                    bonds,
+                    values[Value.START_LOAD + j],
+                    middle,
+                    numbers[BondRow.INITIAL + j],
+                    numbers[BondRow.LENGTH + j],
+                )
+                values[Value.MEAN + j] += damping * (z - start.z) / step.duration
+                values[Value.MEAN + j] += viscous * middle * slide / step.duration
+                values[Value.MEAN_BY_SLIDE + j] += (damping * m + viscous * middle) / step.duration
+            direction = 1.0 if velocity > 0 else -1.0
+            by_velocity = damping * (trial[WIDTH + j] - direction * trial[2 * WIDTH + j] / length)
+            by_velocity += viscous * stop
+            values[Value.END + j] += by_velocity * velocity
+            values[Value.END_BY_VELOCITY + j] = by_velocity
+            trial[j] = length
+        elif numbers[BondRow.GROWTH + j] >= 0:
+            growth = numbers[BondRow.GROWTH + j : BondRow.INITIAL : WIDTH]
+            v = values[Value.START_VELOCITY + j]
+            trial[j] = grow(memory[j], v, velocity, abs(slide), step.duration, growth).length

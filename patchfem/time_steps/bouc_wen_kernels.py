@@ -1,0 +1,87 @@
+"""Bouc-Wen law of contact points under any load (compiled). Equations: `friction.laws.bouc_wen`.
+
+The force is mu y, |y| <= N, with springs s of the largest load so far as in `cells_kernels`, the limit of this law for a
+large exponent: along a path x = s |ds|/(N length), y/N follows the law, dy/ds = s/length (1 - |y/N|^n ...), while the load
+changes along the path. The end of a step gains no more energy than the work of the step.
+"""
+
+from math import exp, sqrt
+
+from ..compiled.flags_kernels import NJIT_CALL
+from ..compiled.jit import njit
+from ..friction.laws.bouc_wen_kernels import follow_path
+from .step_rows_kernels import WIDTH, Value
+
+MIN_RELAXATION = (
+    1e-3  # relaxation over a step below which the first term of a series is exact to 1e-6
+)
+MIN_PATH = 1e-9  # path in lengths below which the slope of the mean is half of that at the end
+
+
+@njit(**NJIT_CALL)
+def slide_bouc_wen(numbers, memory, trial, values, count, step):
+    """Slide a block of points of the Bouc-Wen law; the package describes the arguments (`time_steps`).
+
+    Rows of `numbers`: coefficient of friction, length [m], exponent, shape. Memory: y [N], load of the springs [N].
+    """
+    for j in range(count):
+        friction = numbers[j]
+        length = numbers[WIDTH + j]
+        exponent = numbers[2 * WIDTH + j]
+        load = values[Value.END_LOAD + j]
+        middle = 0.5 * (values[Value.START_LOAD + j] + load)
+        slide = values[Value.SLIDE + j]
+        values[Value.END_BY_VELOCITY + j] = values[Value.MEAN_BY_VELOCITY + j] = 0.0
+        if middle <= 0:
+            trial[j] = 0.0
+            trial[WIDTH + j] = max(load, 0.0)
+            values[Value.END + j] = values[Value.MEAN + j] = 0.0
+            values[Value.END_BY_SLIDE + j] = values[Value.MEAN_BY_SLIDE + j] = 0.0
+            values[Value.ENERGY + j] = values[Value.STRETCH + j] = 0.0
+            continue
+
+        # The first half of the change of load cuts the force and adds springs; the path is under the mean load.
+        start = min(max(memory[j], -middle), middle)
+        springs = max(memory[WIDTH + j], middle)
+        energy = 0.5 * length * start * start / springs
+        direction = 1.0 if slide > 0 else -1.0
+        path = abs(slide) * springs / (length * middle)
+        y = direction * start / middle
+        moved = follow_path(y, path, exponent, numbers[3 * WIDTH + j])
+        mean = moved.mean if path > 0 else y
+        work = energy + middle * mean * abs(slide)
+        size = abs(moved.end) ** exponent
+        rate = (1 - size if moved.end > 0 else 1 - (1 - 2 * numbers[3 * WIDTH + j]) * size) / length
+        rate *= springs
+
+        # Springs beyond the load break over the part of the path that slips.
+        slipped = max(path - (moved.end - y), 0.0) * middle / springs
+        left = middle + (springs - middle) / (1 + slipped * (1 + 0.5 * slipped))
+        left = max(left, load) if load > 0 else 0.0
+
+        # Second half of the change of load
+        stop = middle * moved.end
+        last = min(max(stop, -load), load)
+        if stop > 0 and slide != 0:
+            # Under a load that is linear in the path, the deviation of y relaxes at the rate r per path of the step. Its end
+            # then deviates from that under the mean load by y/N (1 + exp(-r) - 2 (1 - exp(-r))/r) of half the change.
+            relaxation = exponent * moved.end ** (exponent - 1) * path
+            share = relaxation * relaxation / 6
+            if relaxation > MIN_RELAXATION:
+                decay = exp(-relaxation)
+                share = 1 + decay - 2 * (1 - decay) / relaxation
+            last = min(stop + moved.end * share * (load - middle), load)
+        most = sqrt(2 * work * left / length)
+        last = min(max(last, -most), most)
+        trial[j] = direction * last
+        trial[WIDTH + j] = left
+        values[Value.END + j] = friction * direction * last
+        values[Value.MEAN + j] = friction * direction * middle * mean
+        values[Value.END_BY_SLIDE + j] = friction * rate if abs(stop) <= load else 0.0
+        slope = 0.5 * rate
+        if path > MIN_PATH:
+            slope = middle * (moved.end - mean) / abs(slide)
+        values[Value.MEAN_BY_SLIDE + j] = friction * slope
+        stretch = direction * last * length / left if left > 0 else 0.0
+        values[Value.ENERGY + j] = 0.5 * friction * direction * last * stretch
+        values[Value.STRETCH + j] = stretch

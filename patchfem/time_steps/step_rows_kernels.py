@@ -1,0 +1,221 @@
+"""Rows of a block of contact points in a step."""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+# Points of a block, the entries of a row; of 16, 32 and 48, the fastest for sets of 47 and of 107 points
+WIDTH = 48
+VECTOR = 4  # numbers that a processor handles at once; loops over whole vectors need no remainder
+N_VALUES = 22  # rows of `Value`
+
+
+class Law(IntEnum):
+    """Number of a law, which names the function of its points.
+
+    - CELLS: a spring and a slider in series; elastic-plastic law, Coulomb with a compliance of its own
+    - SLIDERS: many of them in parallel; Iwan
+    - BONDS: bonds that are summed by their moments; nonlocal law of order 1, Dahl and LuGre
+    - BOUC_WEN, TANH: laws of these names
+    - CUBIC, INTERLOCK: nonlinear springs
+    - COULOMB: rigid friction of a port, which is solved with the motion of this port
+    - LIST: bonds that are summed one by one
+    """
+
+    CELLS = 0
+    BONDS = 1
+    BOUC_WEN = 2
+    TANH = 3
+    CUBIC = 4
+    INTERLOCK = 5
+    COULOMB = 6
+    LIST = 7
+    SLIDERS = 8
+
+
+class Value(IntEnum):
+    """Rows of the values of points.
+
+    - START_LOAD, END_LOAD: normal load at the ends of the step [N]
+    - SLIDE: increment of the displacement [m]
+    - START_VELOCITY, VELOCITY: velocity at the ends of the step [m/s]
+    - START, END: friction force at the ends of the step [N]
+    - MEAN: mean of the force over the path [N]
+    - END_BY_SLIDE, END_BY_VELOCITY, MEAN_BY_SLIDE, MEAN_BY_VELOCITY: derivatives by SLIDE [N/m] and VELOCITY [N s/m]
+    - ENERGY, STRETCH: stored energy [J] and elastic part of the displacement [m] at the end
+    - BENT: part of the increment that the pieces take by shear [m]
+    - FORCE: force on the port [N], a mean of the step
+    - BY_SLIDE, BY_SHEAR, BY_VELOCITY: its derivatives by the increment of the port, by BENT [N/m] and by the velocity of
+      the port [N s/m]
+    - TOTAL: displacement since the start [m]
+    - LAST_SLIDE: SLIDE of the last step [m]
+    - WEIGHTED: workspace of the Jacobian
+    """
+
+    START_LOAD = 0
+    END_LOAD = WIDTH
+    SLIDE = 2 * WIDTH
+    START_VELOCITY = 3 * WIDTH
+    VELOCITY = 4 * WIDTH
+    START = 5 * WIDTH
+    END = 6 * WIDTH
+    MEAN = 7 * WIDTH
+    END_BY_SLIDE = 8 * WIDTH
+    END_BY_VELOCITY = 9 * WIDTH
+    MEAN_BY_SLIDE = 10 * WIDTH
+    MEAN_BY_VELOCITY = 11 * WIDTH
+    ENERGY = 12 * WIDTH
+    STRETCH = 13 * WIDTH
+    BENT = 14 * WIDTH
+    FORCE = 15 * WIDTH
+    BY_SLIDE = 16 * WIDTH
+    BY_SHEAR = 17 * WIDTH
+    BY_VELOCITY = 18 * WIDTH
+    TOTAL = 19 * WIDTH
+    LAST_SLIDE = 20 * WIDTH
+    WEIGHTED = 21 * WIDTH
+
+
+class Step(NamedTuple):
+    """Step of contact points.
+
+    - duration [s]; 0 for a change of load at rest
+    - rate, lag [1/s]: velocity at the end by a formula of order 2 (BDF2), rate * increment - lag * last increment
+    """
+
+    duration: float
+    rate: float
+    lag: float
+
+
+class CellRow(IntEnum):
+    """Rows of `numbers` of points with a spring and a slider in series.
+
+    - FRICTION, LENGTH: coefficient of friction, and slide [m] at which an unstretched point slips
+    - IS_FIXED: 1 if the stiffness does not follow the load
+
+    Memory: force over the coefficient of friction [N], load [N] whose springs the point has.
+    """
+
+    FRICTION = 0
+    LENGTH = WIDTH
+    IS_FIXED = 2 * WIDTH
+
+
+class SliderRow(IntEnum):
+    """Entries of `numbers` of points with K parallel springs and sliders, which all points of a block share.
+
+    - FRICTION: coefficients of friction of the points
+    - COUNT: number K, a multiple of VECTOR; the last ones may have no weight
+    - CELLS: first of K weights, the fractions of the friction limit, and of K inverse lengths [1/m] that follow
+
+    Memory: for each point in turn, K forces over the coefficient of friction [N] and K loads of the springs [N].
+    """
+
+    FRICTION = 0
+    COUNT = WIDTH
+    CELLS = 2 * WIDTH
+
+
+class BondRow(IntEnum):
+    """Rows of `numbers` of bonds that are summed by moments.
+
+    - FRICTION, LENGTH: coefficient of friction and bond length eps_0 [m]; the stiffness is their ratio times the load
+    - GROWTH: first of five numbers of growing bonds (eq. 2.10), the first of which is below 0 for a constant length
+    - INITIAL: density m_0 of the bonds that a rising load forms
+    - KINETIC, SPEED: kinetic coefficient of friction and Stribeck velocity [m/s] of the LuGre law, or 0
+    - DAMPING, VISCOUS: damping of the bonds and viscous friction per unit of load [s/m]
+
+    Memory: bond length [m], m [N], z [N m], s2 [N m2].
+    """
+
+    FRICTION = 0
+    LENGTH = WIDTH
+    GROWTH = 2 * WIDTH
+    INITIAL = 7 * WIDTH
+    KINETIC = 8 * WIDTH
+    SPEED = 9 * WIDTH
+    DAMPING = 10 * WIDTH
+    VISCOUS = 11 * WIDTH
+
+
+class Port(IntEnum):
+    """Rows of `Ports.values`.
+
+    - SLIDE, VELOCITY: at the start of a step [m], [m/s]
+    - FREE, FREE_VELOCITY: increment and velocity at the end without forces [m], [m/s]
+    - FORCE: mean force of the step [N]
+    - END_VELOCITY, INCREMENT: velocity at the end [m/s] and increment [m] under the assumed forces
+    - HOLD: force that holds a port at rest [N]
+    - SUM, BY_SLIDE, BY_VELOCITY: sums over the points of the port of their forces and of the slopes
+    - BASE: force from which a line search starts [N]
+    - LAST, EARLIER, FIRST: mean forces of the last three steps [N], the last one first
+    - DAMPING: weight of the force at the end of the step in the mean force, above 0 where the step does not resolve the
+      vibration of the port on its points
+    - STIFFNESS, VISCOSITY: of the points at rest [N/m], [N s/m]
+    - MOVE: increment of the points [m]
+    - RETURN: displacement of a rigid port at rest that is taken back [m]
+    """
+
+    SLIDE = 0
+    VELOCITY = 1
+    FREE = 2
+    FREE_VELOCITY = 3
+    FORCE = 4
+    END_VELOCITY = 5
+    HOLD = 6
+    INCREMENT = 7
+    SUM = 8
+    BY_SLIDE = 9
+    BY_VELOCITY = 10
+    BASE = 11
+    LAST = 12
+    EARLIER = 13
+    DAMPING = 14
+    STIFFNESS = 15
+    VISCOSITY = 16
+    MOVE = 17
+    RETURN = 18
+    FIRST = 19
+
+
+class Points(NamedTuple):
+    """Points of p ports in b blocks; r shear coordinates of the pieces.
+
+    - law, port, count, n_memory (b,): law, port, number of points and used entries of the memory of each block
+    - first, first_shear (p + 1,): first block and first shear coordinate of each port
+    - numbers (b, k), memory, trial (b, l), values (b, v): arrays of the laws (`time_steps`)
+    - node (b, WIDTH): node whose force is the load of a point; -1 for a fraction `share` of the resultant, -2 for `share`
+      times the pressure of the lower piece at the place of the point
+    - share, place (b, WIDTH): fraction of the resultant or factor of the pressure [N]; position at rest [m]
+    - shapes (r, b WIDTH), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
+    - shear (8, r): see `march_rows.Shear`
+    - is_spring (p,): whether the points of a port are springs, whose work is not friction
+    - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
+    - nodal (n,): forces of the nodes of a patch [N]
+    - clock (1,): duration of the last step [s], 0 at the start
+    - products (r, 2): workspace
+    """
+
+    law: np.ndarray
+    port: np.ndarray
+    count: np.ndarray
+    n_memory: np.ndarray
+    first: np.ndarray
+    first_shear: np.ndarray
+    numbers: np.ndarray
+    memory: np.ndarray
+    trial: np.ndarray
+    values: np.ndarray
+    node: np.ndarray
+    share: np.ndarray
+    place: np.ndarray
+    shapes: np.ndarray
+    stiffness: np.ndarray
+    shear: np.ndarray
+    is_spring: np.ndarray
+    pressure: np.ndarray
+    nodal: np.ndarray
+    clock: np.ndarray
+    products: np.ndarray

@@ -1,0 +1,314 @@
+"""Arrays of a march of contact points, and the states that are read from it."""
+
+import numpy as np
+
+from .. import compiled
+from ..core import ModalBasis
+from ..friction.bonds.list_rows_kernels import N_ROWS, BondLists
+from ..points import time_march
+from ..points.march_rows import RESULTANT, Flank, Options, Ports, Shear, Structure, System, Total
+from .step_rows_kernels import N_VALUES, WIDTH, Law, Points, Port, Value
+
+# Lengths of the steps: whole ones, and those after up to seven halvings, by which a step that fails is retried
+N_LEVELS = 8
+
+
+def load_kernels(contact, say=None):
+    """Return the compiled march, with contact sets only if a contact needs them."""
+    parts = {} if contact.sets is not None else {"normal": "points.no_normal_kernels"}
+    return compiled.instantiate("time_steps.march_kernels", parts, say)
+
+
+def make_system(
+    contact, step: float, modes: ModalBasis | None = None, travel: float = np.inf, start=None
+) -> System:
+    """Return the arrays of a rig or of a prescribed slide at its start, without the drive.
+
+    Parameters
+    ----------
+    contact : contacts.Contact
+        Laws and loads of the points.
+    step : float
+        Duration of a whole step [s].
+    modes : ModalBasis, optional
+        Without modes the displacement of the first port is prescribed.
+    travel : float
+        Largest output [m].
+    start : core.InitialState, optional
+        Modal coordinates and velocities; at rest by default.
+    """
+    # Heave and pitch of a normal contact are two ports more; their numbers are -1 without them.
+    n = 0 if modes is None else modes.omega.size
+    rows = [np.zeros(n) if modes is None else point_set.row for point_set in contact.point_sets]
+    press = np.zeros(11)
+    press[:2] = -1.0
+    if contact.sets is not None:
+        press[:2] = len(rows), len(rows) + 1
+        rows += [contact.heave, contact.pitch]
+    rows = np.array(rows, float).reshape(len(rows), n)
+
+    # Responses of the modes; a prescribed slide has none.
+    mass = 1.0
+    responses = time_march.Responses(*(np.zeros((N_LEVELS, k, 3)) for k in (0, 3, 3)))
+    shape = np.zeros((3, 0))
+    damping = np.zeros((0, 0))
+    if modes is not None:
+        mass = float(modes.mass)
+        responses = time_march.make_responses(modes, step, N_LEVELS)
+        shape = np.array([modes.omega**2, modes.base, modes.output], float)
+        damping = np.array(modes.damping_matrix, float)
+    by_force = responses.motion[:, :, 2 * n + 3 :]
+    compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
+
+    points = _make_points(contact, len(rows))
+    size = len(rows) + points.stiffness.size
+    ports = Ports(
+        rows,
+        np.array(compliance).reshape(N_LEVELS, 2, len(rows), len(rows)) / mass,
+        rows @ rows.T / mass,
+        _find_redundant(rows, contact),
+        _make_port_values(contact, len(rows)),
+        np.zeros((size, size)),
+        np.zeros(size),
+        np.zeros(size),
+        press,
+    )
+    structure = Structure(
+        *responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(3 * n + 3)
+    )
+    options = Options(
+        mass,
+        float(step),
+        float(travel),
+        max(float(contact.limit), 1e-300),
+        int((points.law == Law.COULOMB).any()),
+        0,
+        int(contact.has_loads),
+        0,
+    )
+    state = np.zeros((3, 2 * n))
+    if start is not None:
+        state[0] = [*start.z, *start.v]
+    sets = time_march.make_no_sets() if contact.sets is None else contact.sets.make_arrays()
+    no_lists = BondLists(
+        np.zeros((N_ROWS, 0)), np.zeros((0, 6)), np.zeros((0, 14)), *[np.zeros(0)] * 3
+    )
+    flank = time_march.make_flank(contact)
+    totals = np.zeros(len(Total))
+    system = System(structure, ports, points, no_lists, flank, sets, state, totals, options)
+    _set_start(system, contact)
+    return system
+
+
+def _set_start(system: System, contact) -> None:
+    """Give points and ports the displacements and velocities of the start, and find the loads there."""
+    points = system.points
+    n = system.state.shape[1] // 2
+    rows = system.ports.rows[points.port]
+    values = points.values.reshape(len(points.law), N_VALUES, WIDTH)
+    slides = rows @ system.state[0, :n]
+    velocities = rows @ system.state[0, n:]
+    values[:, Value.TOTAL // WIDTH] = slides[:, None]
+    values[:, Value.VELOCITY // WIDTH] = values[:, Value.START_VELOCITY // WIDTH] = velocities[
+        :, None
+    ]
+
+    # Springs refer to the displacement at rest; rigid friction opposes the velocity of its port.
+    is_spring = points.is_spring[points.port].astype(bool)
+    points.memory[is_spring, 0] = slides[is_spring]
+    is_rigid = points.law == Law.COULOMB
+    limits = points.numbers[:, WIDTH] * values[:, Value.END_LOAD // WIDTH, 0]
+    values[is_rigid, Value.END // WIDTH, 0] = (limits * np.sign(velocities))[is_rigid]
+    values[is_rigid, Value.STRETCH // WIDTH, 0] = (velocities == 0)[is_rigid]
+    if contact.sets is not None:
+        time_march.press_first(system, contact)
+    if contact.grooves is not None and n:
+        _climb_first(system, contact)
+    points.trial[:] = points.memory
+
+
+def _climb_first(system: System, contact) -> None:
+    """Give the lifted mass the vertical velocity of the flank, and the points the normal force there."""
+    ratio = time_march.find_first_climb(system, contact)
+    points = system.points
+    for row in (Value.START_LOAD, Value.END_LOAD):
+        points.values[:, row : row + WIDTH] *= ratio
+    is_bonds = points.law == Law.BONDS
+    points.memory[is_bonds, WIDTH:] *= ratio
+    points.memory[points.law == Law.CELLS, WIDTH:] *= ratio
+    points.memory[points.law == Law.SLIDERS] *= ratio
+    points.memory[points.law == Law.BOUC_WEN, WIDTH:] *= ratio
+
+
+def _find_redundant(rows, contact) -> np.ndarray:
+    """Return the relative compliances (p,) of rigid ports, which are 0 unless ports outnumber the modes.
+
+    Such ports share their forces by the modal forces at which they slip, so that they reach their limits at once.
+
+    Parameters
+    ----------
+    rows : (p, n) array
+        Displacement of the ports per modal coordinate.
+    contact : contacts.Contact
+        Points of the first ports, with their loads at the start.
+    """
+    count, n = rows.shape
+    redundant = np.zeros(count)
+    is_rigid = np.zeros(count, bool)
+    is_rigid[: len(contact.point_sets)] = [
+        point_set.law.law == Law.COULOMB for point_set in contact.point_sets
+    ]
+    if is_rigid.sum() <= n:
+        return redundant
+    limits = [point_set.law.limits.sum() for point_set in contact.point_sets]
+    strength = np.array(limits) * np.linalg.norm(rows[: len(limits)], axis=1)
+    largest = strength[is_rigid[: len(limits)]].max(initial=0.0)
+    share = strength / largest if largest > 0 else np.ones(len(limits))
+    redundant[: len(limits)] = time_march.REDUNDANT / np.maximum(share, time_march.MIN_STRENGTH)
+    return redundant * is_rigid
+
+
+def find_stiffness(point_set) -> float:
+    """Return the stiffness [N/m] of points at rest, in series with the shear of their pieces; 0 for rigid points."""
+    law = point_set.law
+    if point_set.shear is None:
+        return float(law.stiffness.sum())
+    # 1^T (D^-1 + S K^-1 S^T)^-1 1 for the stiffnesses D of the points and K of the coordinates of shapes S
+    is_stiff = law.stiffness > 0
+    shape = np.asarray(point_set.shear.shape)[is_stiff]
+    compliance = np.diag(1 / law.stiffness[is_stiff])
+    compliance += (shape / point_set.shear.stiffness) @ shape.T
+    return float(np.linalg.solve(compliance, np.ones(len(shape))).sum())
+
+
+def _make_port_values(contact, n_ports: int) -> np.ndarray:
+    """Return the rows of the ports, with stiffness and viscosity of their points at rest in series with the pieces."""
+    values = np.zeros((len(Port), n_ports))
+    for p, point_set in enumerate(contact.point_sets):
+        law = point_set.law
+        values[Port.VISCOSITY, p] = law.viscosity.sum()
+        values[Port.STIFFNESS, p] = find_stiffness(point_set)
+    return values
+
+
+def _make_points(contact, n_ports: int) -> Points:
+    """Return the arrays of all points."""
+    sets = contact.point_sets
+    blocks = [point_set.law.make_blocks() for point_set in sets]
+    counts = [len(part.count) for part in blocks]
+    n_blocks = sum(counts)
+    numbers = np.zeros((n_blocks, max([2 * WIDTH, *(part.numbers.shape[1] for part in blocks)])))
+    memory = np.zeros((n_blocks, max([WIDTH, *(part.memory.shape[1] for part in blocks)])))
+    values = np.zeros((n_blocks, N_VALUES * WIDTH))
+    node = np.full((n_blocks, WIDTH), RESULTANT, np.int64)
+    share = np.zeros((n_blocks, WIDTH))
+    place = np.zeros((n_blocks, WIDTH))
+    shears = [point_set.shear for point_set in sets]
+    n_shear = [0 if shear is None else len(shear.stiffness) for shear in shears]
+    first_shear = np.cumsum([0, *n_shear, *[0] * (n_ports - len(sets))])
+    shapes = np.zeros((sum(n_shear), n_blocks * WIDTH))
+    stiffness = np.zeros(sum(n_shear))
+    scale = np.ones(sum(n_shear))
+
+    resultant = contact.preload
+    if contact.grooves is not None:
+        resultant *= float(np.hypot(1.0, contact.grooves.slope(0.0)))
+    first = 0
+    for p, (point_set, part) in enumerate(zip(sets, blocks)):
+        end = first + len(part.count)
+        numbers[first:end, : part.numbers.shape[1]] = part.numbers
+        memory[first:end, : part.memory.shape[1]] = part.memory
+        for row in (Value.START_LOAD, Value.END_LOAD):
+            values[first:end, row : row + WIDTH] = part.load
+        # A single point carries a prescribed load that is 0 at the start.
+        share[first:end] = part.load / resultant if resultant > 0 else 1.0
+        size = point_set.law.load.size
+        places = slice(WIDTH * first, WIDTH * first + size)
+        if point_set.nodes is not None:
+            node.reshape(-1)[places] = point_set.nodes
+        if point_set.shares is not None:
+            share.reshape(-1)[places] = point_set.shares
+            place.reshape(-1)[places] = point_set.places
+        if point_set.shear is not None:
+            own = slice(first_shear[p], first_shear[p + 1])
+            shape = np.asarray(point_set.shear.shape).T
+            shapes[own, places] = shape
+            stiffness[own] = point_set.shear.stiffness
+            scale[own] = 1 / np.sqrt((shape**2).mean(axis=1))
+        first = end
+
+    shear = np.zeros((len(Shear), stiffness.size))
+    shear[Shear.SCALE] = scale
+    n_nodes = 0 if contact.sets is None else contact.sets.x.size
+    return Points(
+        np.repeat([int(point_set.law.law) for point_set in sets], counts).astype(np.int64),
+        np.repeat(np.arange(len(counts)), counts),
+        np.concatenate([np.zeros(0, np.int64), *(part.count for part in blocks)]),
+        _count_memory(sets, blocks),
+        np.cumsum([0, *counts, *[0] * (n_ports - len(sets))]),
+        first_shear,
+        numbers,
+        memory,
+        memory.copy(),
+        values,
+        node,
+        share,
+        place,
+        shapes,
+        stiffness,
+        shear,
+        np.array([*(point_set.is_spring for point_set in sets), *[False] * (n_ports - len(sets))]),
+        np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
+        np.zeros(n_nodes),
+        np.zeros(1),
+        np.zeros((stiffness.size, 2)),
+    )
+
+
+def _count_memory(sets, blocks) -> np.ndarray:
+    """Return the number of used entries of the memory of each block (b,)."""
+    used = [np.zeros(0, np.int64)]
+    for point_set, part in zip(sets, blocks):
+        sliders = point_set.law.sliders
+        if sliders is None:
+            used.append(np.full(len(part.count), part.memory.shape[1]))
+        else:
+            used.append(2 * sliders.weights.size * part.count)
+    return np.concatenate(used)
+
+
+def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> time_march.Snapshot:
+    """Return the state of the points on the first port; `motion` has the first six fields of Snapshot.
+
+    Parameters
+    ----------
+    kernels : module
+        Compiled march.
+    system : march_rows.System
+        Arrays of the march.
+    motion : tuple
+        The first six fields of Snapshot.
+    """
+    points = system.points
+    n_blocks = int(points.first[1])
+    count = int(points.count[:n_blocks].sum())
+    values = points.values.reshape(-1, N_VALUES, WIDTH)
+
+    def read(row):
+        """Return a row of the points of the first port (m,)."""
+        return values[:n_blocks, row // WIDTH].reshape(-1)[:count].copy()
+
+    forces = read(Value.START)
+    own = slice(0, points.first_shear[1])
+    shapes = points.shapes[own, :count]
+    bend = (shapes @ forces / points.stiffness[own]) @ shapes
+    has_nodes = system.ports.contact[0] >= 0
+    return time_march.Snapshot(
+        *motion,
+        forces,
+        read(Value.STRETCH),
+        bend,
+        read(Value.END_LOAD),
+        points.nodal.copy() if has_nodes else np.zeros(0),
+        float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0,
+    )

@@ -1,0 +1,167 @@
+"""Every case of each kind of sweep agrees with its single run, and meets the tolerance or says why not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import run_cli
+from scene_texts import BLOCK, COATING, COULOMB, MODE, POINT
+from sweep_tables import read_rows
+
+import patchfem as pf
+from patchfem.export import store
+
+SHIPPED = Path(__file__).parents[3] / "studies/rig/rig.toml"
+TILT = '[contact.tilt]\nangle = "0.05 mrad"\n'
+CROWN = '[contact.crown]\nradius = "3 m"\n'
+PATCH = BLOCK + COATING + TILT
+RIG = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "1 um"\n' + MODE
+DRIVE = '[drive]\nkind = "base"\nfrequency = "120 Hz"\nacceleration = "6 g"\ncycles = 60\n'
+# Scene and options of each kind of sweep, in which {n} is the number of cases
+KINDS = {
+    "load": (PATCH, ["--over", "contact.load=20 N..900 N:{n}"]),
+    "tilt": (PATCH, ["--over", "contact.tilt.angle=-0.2 mrad..0.2 mrad:{n}"]),
+    "crown": (PATCH + CROWN, ["--over", "contact.crown.radius=1 m..40 m:{n}"]),
+    "step": (
+        PATCH + '[contact.step]\nheight = "0.1 um"\nat = "2 mm"\n',
+        ["--over", "contact.step.height=-0.3 um..0.4 um:{n}"],
+    ),
+    "thickness": (PATCH, ["--over", "contact.coating.thickness=0.1 mm..0.4 mm:{n}"]),
+    "profile": (
+        PATCH + '[contact.profile]\nfile = "a.csv"\n',
+        ["--over", "contact.profile.file=a.csv,b.csv", "--over", "contact.load=50 N..400 N:{half}"],
+    ),
+    "law keys": (
+        POINT + RIG + DRIVE,
+        [
+            "--over",
+            "friction.static=0.1..0.5:{half}",
+            "--over",
+            "friction.law=elastic-plastic,coulomb",
+        ],
+    ),
+    "frequency": (POINT + RIG + DRIVE, ["--over", "drive.frequency=90 Hz..170 Hz:{n}"]),
+    "two keys": (
+        PATCH,
+        [
+            "--over",
+            "contact.load=50 N..400 N:{half}",
+            "--over",
+            "contact.tilt.angle=0 rad,0.1 mrad",
+        ],
+    ),
+    "three keys": (
+        PATCH + CROWN,
+        [
+            "--over",
+            "contact.load=50 N..400 N:{half}",
+            "--over",
+            "contact.tilt.angle=0.01 mrad,0.1 mrad",
+            "--over",
+            "contact.crown.radius=2 m,20 m",
+        ],
+    ),
+    "Sobol": (
+        POINT + COULOMB + MODE + DRIVE,
+        [
+            "--over",
+            "friction.static=0.1..0.6",
+            "--over",
+            "normal.load=50 N..150 N",
+            "--sobol",
+            "{n}",
+        ],
+    ),
+    "table": (PATCH, ["--cases", "cases.csv"]),
+    "shipped rig": (
+        SHIPPED.read_text("utf-8").partition("[measured]")[0],
+        ["--over", "contact.load=70 N..125 N:{n}"],
+    ),
+}
+FAST = ("load", "step", "law keys", "table")
+
+
+def write_inputs(n: int) -> None:
+    """Write two profiles and a table of n cases into the current folder."""
+    t = np.linspace(-1, 1, 161)
+    for name, shape in (("a.csv", 0.2 * np.cos(3 * t)), ("b.csv", 0.3 * t**2)):
+        rows = [f"{7 * x:.6f},{z:.6f}" for x, z in zip(t, shape)]
+        Path(name).write_text("\n".join(["x [mm],z [um]", *rows]) + "\n")
+    rng = np.random.default_rng(n)
+    loads, tilts = rng.uniform(30, 900, n), rng.uniform(-0.1, 0.1, n)
+    rows = [
+        f"{load:.4f},{tilt:.5f},{plane}"
+        for load, tilt, plane in zip(loads, tilts, n * ["strain", "stress"])
+    ]
+    Path("cases.csv").write_text(
+        "\n".join(["contact.load [N],contact.tilt.angle [mrad],contact.plane", *rows]) + "\n"
+    )
+
+
+def check_kind(kind: str, n: int) -> None:
+    """Run a sweep of a kind with about n cases, and compare each case with its single run."""
+    text, options = KINDS[kind]
+    write_inputs(n)
+    Path("scene.toml").write_text(text)
+    words = [word.format(n=n, half=max(n // 2, 2)) for word in options]
+    answer = run_cli(
+        "sweep", "scene.toml", *words, "--keep", "none", "--no-page", "-q", "-o", "out"
+    )
+    assert answer.code in (0, 3), answer.err
+    data = store.read_answer(Path("out")).data
+    rows = read_rows(Path("out"))
+    keys = list(rows[0])[: list(rows[0]).index("outcome")]
+    columns = {
+        name: [data[name + end].values.ravel() for end in ("", "_error")]
+        for name in data
+        if f"{name}_error" in data
+    }
+    floors = {
+        name: data[f"{name}_floor"].values.ravel()
+        if f"{name}_floor" in data
+        else 0 * columns[name][0]
+        for name in columns
+    }
+
+    ratios = []
+    for case, row in enumerate(rows):
+        single = pf.run("scene.toml", **{key: row[key] for key in keys})
+        assert row["outcome"] == single.outcome, (kind, case)
+        tolerance = single.plan.model.accuracy.tolerance
+        for name, (values, errors) in columns.items():
+            # The case meets its tolerance, or says why not.
+            if np.isfinite(errors[case]):
+                allowed = tolerance * abs(values[case]) + floors[name][case]
+                assert errors[case] <= 1.001 * allowed or row["message"], (kind, case, name)
+
+            # A value that both have differs by no more than both errors.
+            measure = single.measures.get(name)
+            if (
+                measure is None
+                or measure.value is None
+                or measure.error is None
+                or not np.isfinite(values[case])
+            ):
+                continue
+            # Values that are 0 but for round-off have no error.
+            allowed = errors[case] + measure.error + 1e-9 * (abs(measure.value) + measure.floor)
+            ratios.append(abs(values[case] - measure.value) / allowed)
+
+    # An error is an estimate, which holds for 95 % of the measures and is never far too small.
+    assert len(ratios) >= 8 * len(rows)
+    assert np.mean(np.array(ratios) <= 1) >= 0.99 and max(ratios) < 2
+
+
+@pytest.mark.parametrize("kind", FAST)
+def test_always_some_cases_agree_with_single_runs(kind, tmp_path, monkeypatch):
+    """Values are within the sum of both errors, the outcome is the same, and a case that misses its tolerance says why."""
+    monkeypatch.chdir(tmp_path)
+    check_kind(kind, 4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_always_cases_agree_with_single_runs(kind, tmp_path, monkeypatch):
+    """Twenty cases of each kind of sweep agree with single runs in the same way."""
+    monkeypatch.chdir(tmp_path)
+    check_kind(kind, 40 if kind == "Sobol" else 20)

@@ -1,0 +1,265 @@
+"""Every friction law with every effect: balance of energy, sign of dissipation, and the limit of a vanishing effect.
+
+A combination runs once with an effect of a marked size, where its energies must balance and friction must dissipate, and
+once with an effect so small that the motion must be that without it. Combinations that are still refused are listed in
+REFUSED alone; one of them that begins to run makes its test fail until it leaves the list.
+"""
+
+from functools import cache
+
+import pytest
+from scene_runs import run_scene
+
+from patchfem.scene import loads
+from patchfem.scene.scene import SceneError
+
+LAWS = {
+    "coulomb": 'law = "coulomb"\n',
+    "tanh": 'law = "tanh"\nreference_speed = "5 mm/s"\n',
+    "elastic-plastic": 'law = "elastic-plastic"\nbond_length = "2 um"\n',
+    "stiffness": 'law = "elastic-plastic"\nstiffness = "1.7e7 N/m"\n',
+    "nonlocal": 'law = "nonlocal"\nbond_length = "2 um"\n',
+    "order 2": 'law = "nonlocal"\nbond_length = "2 um"\norder = 2\n',
+    "report": 'law = "nonlocal"\nbond_length = "2 um"\nreading = "report"\n',
+    "convolution": 'law = "convolution"\nbond_length = "100 um"\n',
+    "iwan": 'law = "iwan"\nstiffness = "1.7e7 N/m"\nchi = -0.5\nbeta = 0.5\n',
+    "bouc-wen": 'law = "bouc-wen"\nstiffness = "1.7e7 N/m"\nexponent = 1.5\n',
+    "lugre": 'law = "lugre"\nstiffness = "1.7e7 N/m"\nstribeck_speed = "10 mm/s"\nkinetic = 0.25\n',
+}
+RATE_LAWS = ("tanh", "iwan", "bouc-wen", "lugre")  # laws without elements that stick or slip
+LISTS = ("order 2", "report")
+# Combinations that are refused, by effect; "bench ..." are those of a prescribed slide.
+REFUSED = {
+    "shear": ("convolution",),
+    "yaw": ("order 2", "report", "convolution"),
+    "lower": (
+        "coulomb",
+        "tanh",
+        "elastic-plastic",
+        "stiffness",
+        "convolution",
+        "iwan",
+        "bouc-wen",
+        "lugre",
+    ),
+    "load": ("order 2",),
+    "pitch": ("order 2", "convolution"),
+    "shear and pitch": ("coulomb", "order 2", "convolution"),
+    "grooves": ("stiffness", "order 2", "report", "convolution", "iwan", "bouc-wen", "lugre"),
+    "shear and grooves": (
+        "tanh",
+        "stiffness",
+        "order 2",
+        "report",
+        "convolution",
+        "iwan",
+        "bouc-wen",
+        "lugre",
+    ),
+    "cubic spring": (),
+    "interfaces": ("order 2", "report", "convolution"),
+    "shear of interfaces": ("order 2", "report", "convolution"),
+    "wear": ("convolution",),
+    "bench with shear": ("tanh", "convolution", "iwan", "bouc-wen", "lugre"),
+    "bench with lower": ("elastic-plastic", "stiffness", "iwan", "bouc-wen", "lugre"),
+    "bench with load": ("stiffness", "order 2", "iwan", "bouc-wen", "lugre"),
+    "bench with grooves": (
+        "stiffness",
+        "order 2",
+        "report",
+        "convolution",
+        "iwan",
+        "bouc-wen",
+        "lugre",
+    ),
+}
+# Tolerances of the limit. The slide of a patch with its shape on the lower piece is small against the patch, not zero.
+LIMIT_TOLERANCE = {"lower": 1e-2, "bench with lower": 1e-2}
+POINT = '[normal]\nload = "116 N"\n'
+PATCH = """\
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "116 N"
+element_size = "1.2 mm"
+substrate = {{young = "{}", poisson = 0.3, density = "7800 kg/m^3"}}
+[contact.crown]
+radius = "{}"
+"""
+STEEL = PATCH.format("200 GPa", "10 m")
+RIG = """\
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.02
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 3
+[accuracy]
+steps_per_cycle = 400
+"""
+BENCH = (
+    '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
+    "[accuracy]\nsteps_per_cycle = 400\n"
+)
+MASSES = """\
+[structure]
+masses = ["1 kg", "1 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "1e6 N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "1e6 N/m"
+"""
+CARVED = '[{}.grooves]\nwavelength = "40 um"\namplitude = "{}"\n'
+OSCILLATING = 'amplitude = "{}"\nfrequency = "143 Hz"\nphase = "1 rad"\n'
+SHEAR = "[contact.shear]\n"
+# Pieces a million times as stiff as steel, with the same gap relative to the approach
+STIFF = PATCH.format("2e8 GPa", "1e7 m")
+WORN = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'
+
+
+def add_pitch(pitch: str) -> str:
+    """Return the rig with a mode that pitches the patch."""
+    return RIG.replace("slide = 1.0\n", f'slide = 1.0\npitch = "{pitch}"\n')
+
+
+def make_scenes(effect: str, law: str) -> tuple[str, str, str]:
+    """Return scenes with a marked effect, with a vanishing one, and without it; texts that are equal mean the same run."""
+    keys = f"static = 0.3\n{LAWS[law]}"
+    friction = f"[friction]\n{keys}"
+    point, patch = POINT + friction, STEEL + friction
+    plain = point + RIG
+    lower = STEEL.replace("[contact.crown]\n", '[contact.crown]\non = "lower"\n')
+    cubic = '[structure.stiffening]\ncubic = "{} N/m^3"\n[drive]'
+    face = "structure.interface"
+
+    def write_faces(contact: str, *, has_second: bool = True, second_load: str = "116 N") -> str:
+        """Return two masses with an interface at each, or at the first one, that carries `contact`."""
+        tables = [f"[[{face}]]\nbetween = [1, 0]\n{keys}{contact}"]
+        if has_second:
+            tables.append(
+                f"[[{face}]]\nbetween = [2, 0]\n{keys}{contact}".replace("116 N", second_load)
+            )
+        return MASSES + "".join(tables) + RIG[RIG.index("[drive]") :]
+
+    load = 'load = "116 N"\n'
+    nested = STEEL.replace("[contact", f"[{face}.contact") + f"[{face}.contact.shear]\n"
+    stiff = STIFF.replace("[contact", f"[{face}.contact") + f"[{face}.contact.shear]\n"
+    yawing = RIG.replace("slide = 1.0\n", 'slide = 1.0\nyaw = "{} rad/m"\n')
+    strips = "[contact.strips]\ncount = 3\n"
+    table = {
+        "shear": (STEEL + SHEAR + friction + RIG, STIFF + SHEAR + friction + RIG, patch + RIG),
+        "yaw": (
+            STEEL + strips + friction + yawing.format(20),
+            STEEL + strips + friction + yawing.format(1e-6),
+            patch + RIG,
+        ),
+        "lower": (lower + friction + RIG, lower + friction + RIG, patch + RIG),
+        "load": (
+            POINT + OSCILLATING.format("60 N") + friction + RIG,
+            POINT + OSCILLATING.format("1e-6 N") + friction + RIG,
+            plain,
+        ),
+        "pitch": (patch + add_pitch("0.3 rad/m"), patch + add_pitch("1e-9 rad/m"), patch + RIG),
+        "shear and pitch": (
+            STEEL + SHEAR + friction + add_pitch("0.3 rad/m"),
+            STIFF + SHEAR + friction + add_pitch("1e-15 rad/m"),
+            patch + RIG,
+        ),
+        "grooves": (
+            POINT + CARVED.format("normal", "1 um") + friction + RIG,
+            POINT + CARVED.format("normal", "1e-6 um") + friction + RIG,
+            plain,
+        ),
+        "shear and grooves": (
+            STEEL + SHEAR + CARVED.format("contact", "1 um") + friction + RIG,
+            STIFF + SHEAR + CARVED.format("contact", "1e-6 um") + friction + RIG,
+            patch + RIG,
+        ),
+        "cubic spring": (
+            point + RIG.replace("[drive]", cubic.format(1e15)),
+            point + RIG.replace("[drive]", cubic.format(1e3)),
+            plain,
+        ),
+        "interfaces": (
+            write_faces(load),
+            write_faces(load, second_load="1e-6 N"),
+            write_faces(load, has_second=False),
+        ),
+        "shear of interfaces": (write_faces(nested), write_faces(stiff), write_faces(load)),
+        "wear": (patch + RIG + WORN, patch + RIG + WORN.replace("e-14", "e-30"), patch + RIG),
+        "bench with shear": (
+            STEEL + SHEAR + friction + BENCH, STIFF + SHEAR + friction + BENCH, patch + BENCH
+        ),
+        "bench with lower": (
+            lower + friction + BENCH, lower + friction + BENCH, patch + BENCH
+        ),
+        "bench with load": (
+            POINT + OSCILLATING.format("60 N") + friction + BENCH,
+            POINT + OSCILLATING.format("1e-6 N") + friction + BENCH,
+            point + BENCH,
+        ),
+        "bench with grooves": (
+            POINT + CARVED.format("normal", "1 um") + friction + BENCH,
+            POINT + CARVED.format("normal", "1e-6 um") + friction + BENCH,
+            point + BENCH,
+        ),
+    }  # fmt: skip
+    # Points that stick rigidly need short steps.
+    n_steps = 1600 if law == "coulomb" else 400
+    steps = f"steps_per_cycle = {n_steps}"
+    marked, vanishing, without = (
+        text.replace("steps_per_cycle = 400", steps) for text in table[effect]
+    )
+    return marked, vanishing, without
+
+
+@cache
+def run_measures(text: str) -> dict:
+    """Return the values of the measures of a scene, without error estimates."""
+    measures = run_scene(text, estimate=False).measures
+    return {name: measure.value for name, measure in measures.items()}
+
+
+def is_refused(text: str) -> bool:
+    """Return whether a scene is refused as an unsupported combination."""
+    try:
+        loads(text)
+    except SceneError as error:
+        assert any("not supported yet" in mistake for mistake in error.mistakes), error.mistakes
+        return True
+    return False
+
+
+COMBINATIONS = [(effect, law) for effect in REFUSED for law in LAWS]
+
+
+@pytest.mark.parametrize("effect, law", COMBINATIONS)
+def test_law_with_effect(effect, law):
+    """The energies balance, friction dissipates, and a vanishing effect leaves the motion as it is."""
+    marked, vanishing, without = make_scenes(effect, law)
+    if law in REFUSED[effect]:
+        assert is_refused(marked), "the combination runs: take it out of REFUSED"
+        return
+    found = run_measures(marked)
+    work = found["friction_work"] if found.get("friction_work") else found["energy_dissipated"]
+    assert found["energy_dissipated"] > 0
+    assert abs(found["energy_balance"]) < 2e-3
+    if law != "report":  # the law as printed creates energy
+        assert found["energy_created"] <= 1e-3 * abs(work)
+
+    tolerance = LIMIT_TOLERANCE.get(effect, 3e-3)
+    if law == "convolution" and "lower" in effect:
+        tolerance = 0.1  # a whole node at the edge of the pressed area counts as loaded or not
+    vanished, plain = run_measures(vanishing), run_measures(without)
+    for name in ("loop_area", "friction_force_peak", "relative_displacement_amplitude"):
+        if plain.get(name) is not None:
+            assert vanished[name] == pytest.approx(plain[name], rel=tolerance), name

@@ -1,0 +1,100 @@
+"""Static patches as cases of a group agree with single runs of each of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scene_runs import load_scene
+from scene_texts import BLOCK, COATING
+
+import patchfem as pf
+from patchfem.core import PatchfemError
+from patchfem.runs import patch as folder
+
+TOLERANCE = 1e-3
+TILT = '[contact.tilt]\nangle = "0.02 mrad"\n'
+STEP = '[contact.step]\nheight = "0.2 um"\nat = "2 mm"\n'
+SKIN = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\n'
+UNLIKE = '[contact.upper]\nsubstrate = {young = "70 GPa", poisson = 0.3, density = "2700 kg/m^3"}\n'
+SOFT_LAYER = '[contact.asperities]\nlaw = "exponential"\ndecay_length = "0.3 um"\n'
+ROUND = TILT + '[contact.lower]\nend_radius = "3 mm"\n[contact.upper]\nend_radius = "3 mm"\n'
+LOADS = np.array([20.0, 60.0, 180.0, 540.0])
+ANGLES = np.array([1e-5, -2e-5, 8e-5, 2e-4])
+
+
+def make_group(text: str):
+    """Return the patch model of a scene with LOADS and, if it has a tilt, ANGLES."""
+    patch = pf.build(load_scene(text)).patch.with_loading(load=LOADS)
+    shapes = tuple(
+        (name, keys.model_copy(update={"angle": ANGLES} if name == "tilt" else {}))
+        for name, keys in patch.gap.shapes
+    )
+    return replace(patch, gap=replace(patch.gap, shapes=shapes))
+
+
+def list_single_runs(group) -> list:
+    """Return the measures of a single run of each case."""
+    runs = (
+        folder.mesh_levels.solve_with_coarser(folder.cases.take_patch(group, case), TOLERANCE)
+        for case in range(LOADS.size)
+    )
+    return [patches[0].measures for patches in runs]
+
+
+@pytest.mark.parametrize(
+    "extra", [TILT, TILT + STEP, TILT + SKIN, TILT + UNLIKE, TILT + SOFT_LAYER, ROUND]
+)
+def test_always_cases_agree_with_single_runs_within_errors(extra):
+    """Values differ by less than both errors, and every case meets the tolerance."""
+    group = make_group(BLOCK + COATING + extra)
+    batch = folder.case_meshes.solve_cases(group, LOADS.size, TOLERANCE)
+    assert batch.outcome.tolist() == [folder.cases.OutcomeCode.DONE] * LOADS.size
+    assert batch.reason.tolist() == [folder.cases.Reason.NONE] * LOADS.size
+    assert batch.excess.max() <= 1
+    for case, measures in enumerate(list_single_runs(group)):
+        assert measures.keys() == batch.values.keys()
+        for name, measure in measures.items():
+            if measure.value is None:
+                assert np.isnan(batch.values[name][case])
+                continue
+            allowed = measure.error + batch.errors[name][case]
+            assert abs(batch.values[name][case] - measure.value) <= allowed, (name, case)
+
+
+@pytest.mark.parametrize("extra", [TILT, TILT + STEP, TILT + SKIN, TILT + UNLIKE])
+def test_exact_cases_agree_with_single_runs_on_the_same_mesh(extra):
+    """On a mesh that the scene prescribes, values, errors and floors are those of single runs to 1e-9."""
+    group = make_group(BLOCK + COATING + extra).with_element_size(0.15e-3)
+    batch = folder.case_meshes.solve_cases(group, LOADS.size, TOLERANCE)
+    for case, measures in enumerate(list_single_runs(group)):
+        for name, measure in measures.items():
+            value = np.nan if measure.value is None else measure.value
+            error = np.nan if measure.error is None else measure.error
+            floor = measure.floor
+            size = 1e-9 * abs(np.nan_to_num(value)) + 1e-6 * floor
+            np.testing.assert_allclose(batch.values[name][case], value, rtol=0, atol=size)
+            np.testing.assert_allclose(
+                batch.errors[name][case], error, rtol=1e-6, atol=10 * size, err_msg=name
+            )
+            np.testing.assert_allclose(batch.floors[name][case], floor, rtol=1e-6)
+
+
+def test_always_failed_case_does_not_stop_the_others():
+    """A load that cannot be computed with is refused with its error, and the other cases have their values."""
+    group = make_group(BLOCK + COATING + TILT)
+    loads = LOADS.copy()
+    loads[1] = 1e-250
+    loads[2] = 0.0
+    batch = folder.case_meshes.solve_cases(group.with_loading(load=loads), LOADS.size, TOLERANCE)
+    expected = [
+        folder.cases.OutcomeCode.DONE,
+        folder.cases.OutcomeCode.FAILED,
+        folder.cases.OutcomeCode.NO_CONTACT,
+        folder.cases.OutcomeCode.DONE,
+    ]
+    assert batch.outcome.tolist() == expected
+    assert batch.reason[1] == folder.cases.Reason.REFUSED and isinstance(
+        batch.messages[1], PatchfemError
+    )
+    assert np.isnan(batch.values["pressure_peak"][1])
+    assert batch.excess[[0, 3]].max() <= 1

@@ -1,0 +1,93 @@
+"""Score the program on the recipe of refused combinations: `python tests/support/brute [--references] [PART ...]`.
+
+Without options every scene that the program accepts is run and compared with `references.json`. `--references`
+computes what that file lacks, from brute force alone. A PART limits the scenes to those whose seed, kind, effect or law it
+is.
+"""
+
+import json
+import sys
+from collections import Counter
+from pathlib import Path
+from time import process_time
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from campaigns import Row, measure_rows
+
+from brute import recipe, systems
+from patchfem.runs.run import run
+from patchfem.scene import loads
+from patchfem.scene.scene import SceneError
+
+REFERENCES = Path(__file__).with_name("references.json")
+
+
+def select_scenes(parts: list[str]) -> list[recipe.Scene]:
+    """Return the scenes of the recipe of which one of the `parts` is a property; all scenes without parts."""
+    scenes = recipe.make_scenes()
+    return [scene for scene in scenes if not parts or {*map(str, scene[:4])} & {*parts}]
+
+
+def write_references(scenes) -> None:
+    """Compute the references that the file lacks by brute force."""
+    stored = json.loads(REFERENCES.read_text("utf-8")) if REFERENCES.exists() else {}
+    for scene in scenes:
+        if str(scene.seed) in stored:
+            continue
+        begin = process_time()
+        found = systems.find_reference(scene.text, scene.steps)
+        print(
+            *scene[:4], f"{process_time() - begin:.1f} s, {found.n_unsolved} unsolved", flush=True
+        )
+        stored[str(scene.seed)] = found._asdict()
+        REFERENCES.write_text(json.dumps(stored, indent=0, sort_keys=True) + "\n", "utf-8")
+
+
+def score_scene(scene: recipe.Scene, reference: dict) -> list[Row] | str:
+    """Return the rows of a scene beside its reference, or why it has no result."""
+    try:
+        result = run(loads(scene.text))
+    except SceneError as error:
+        return f"refused: {error.mistakes[0]}"
+    except Exception as error:  # a fault of the program is a row of the report
+        return f"no result: {type(error).__name__}: {error}"
+    return measure_rows(result.measures, reference["values"], reference["doubts"])
+
+
+def print_scores(scenes) -> None:
+    """Run scenes and print each row outside its error, and how many hold per law and per effect."""
+    references = json.loads(REFERENCES.read_text("utf-8"))
+    counts = {True: Counter(), False: Counter()}
+    n_refused = Counter()
+    for scene in scenes:
+        rows = score_scene(scene, references[str(scene.seed)])
+        if isinstance(rows, str):
+            n_refused[f"{scene.kind}, {scene.effect}"] += 1
+            print(*scene[:4], rows, flush=True)
+            continue
+        for row in rows:
+            for group in (scene.law, f"{scene.kind}, {scene.effect}", row.name, "all"):
+                counts[row.holds][group] += 1
+            ratio = row.true_error / max(abs(row.truth), row.floor)
+            mark = "holds" if row.holds else "FAILS"
+            print(*scene[:4], mark, f"{row}", f"relative {ratio:.1e}", flush=True)
+    print("\ngroup: rows whose error holds, of all")
+    for group in sorted(counts[True] + counts[False]):
+        total = counts[True][group] + counts[False][group]
+        print(f"{group}: {counts[True][group]} of {total}")
+    print("scenes without a result:", dict(n_refused))
+
+
+def main(words: list[str]) -> None:
+    """Run the command line."""
+    scenes = select_scenes([word for word in words if word != "--references"])
+    if "--references" in words:
+        write_references(scenes)
+    else:
+        print_scores(scenes)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
