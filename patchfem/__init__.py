@@ -18,7 +18,7 @@ Read the package in this order. A module imports only from its own entry of the 
 14. `mesh`         tagged meshes of two coated pieces
 15. `surface`      measured height profiles for roughness, wear and gaps
 16. `elasticity`   static condensation of the pieces to their interface, and stress recovery
-17. `contact`      gap shapes, unilateral contact, asperity layers, strips
+17. `contact`      gap shapes, unilateral contact, asperity layers, cells of a face
 18. `friction`     friction laws and the sum over bonds along the path
 19. `slip`         partial slip of the pieces: elements, shear modes, tangents
 20. `structure`    modes and drive of the rig

@@ -8,7 +8,7 @@ supported features and its traits, as words separated by blanks. Every law can b
 interface under a constant load. Optional features are:
 
 - `shear`: elastic pieces ([contact.shear]);
-- `joints`: several interfaces, stiffening springs and strips that yaw;
+- `joints`: several interfaces, stiffening springs and bands that yaw;
 - `varying-load`: a normal load that changes with the motion;
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
@@ -189,16 +189,16 @@ EFFECTS = {
     "contact.asperities.law=hertz": Effect(
         "patchfem.contact.asperity_laws", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) dz"
     ),
-    "contact.tilt": Effect(GAP_MODULE, "g += angle x"),
+    "contact.tilt": Effect(GAP_MODULE, "g += angle x + roll y"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
-    "contact.crown": Effect(GAP_MODULE, "g += x^2/(2 radius)"),
+    "contact.crown": Effect(GAP_MODULE, "g += x^2/(2 radius) + y^2/(2 across)"),
     "contact.profile": Effect(
         "patchfem.surface.nodes",
         "g += z(x); z is levelled and averaged over the elements at each node",
     ),
-    "contact.strips": Effect(
-        "patchfem.contact.press",
-        "C f_j >= R_j q - g - roll y_j for each strip j; q is the motion of the common holder",
+    "contact.area": Effect(
+        "patchfem.contact.cells",
+        "u = sum_k c(k) p_k cos(k_x x) cos(k_y y) + free sides; 0 <= p <= hardness",
     ),
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j"),
     "contact.grooves": Effect("patchfem.friction.grooves", GROOVE_EQUATION),

@@ -89,7 +89,6 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         "contact.asperity_laws",
         PATCH_KEYS,
     ),
-    "strips": (PATCH + "[contact.strips]\ncount = 2\n", "contact.press", PATCH_KEYS),
     "point on a rig": (
         COULOMB_RIG,
         "hybrid.runs structure.modes",

@@ -30,6 +30,8 @@ law = "coulomb"
 static = 0.3
 load = "10 N"
 """
+JOINT = MASSES.replace('load = "10 N"\n', "") + DRIVE
+JOINT += COATED.replace("[contact", "[structure.interface.contact")
 
 
 def load(text: str, keys: dict, folder) -> None:
@@ -133,6 +135,14 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     "structure.mode.lateral": (
         partial(load, RIG, {"structure.mode.axial.lateral": 0.2}),
         "the patch slides along x alone",
+    ),
+    "contact.strips": (
+        partial(load, COATED, {"contact.strips.count": 4}),
+        "use [contact.area]",
+    ),
+    "structure.interface.contact.strips": (
+        partial(load, JOINT, {"structure.interface.0.contact.strips.count": 4}),
+        "use [structure.interface.contact.area]",
     ),
     "accuracy.harmonics": (
         partial(load, RIG, {"accuracy.harmonics": 9}),

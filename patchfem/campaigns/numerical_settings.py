@@ -9,15 +9,22 @@ from ..model.model import Model
 from ..runs.bench import engine
 from ..runs.plan import plan
 from ..runs.rig import numerics
+from ..scene.keys.contact import MAX_AREA_CELLS, MIN_AREA_CELLS
 from ..scene.rules.accuracy import has_effect
 
 # Settings that are counts, with their limits, besides the element size.
-COUNT_LIMITS = {"steps_per_cycle": (4, 12800), "shear_modes": (1, inf), "jumps": (1, inf)}
+COUNT_LIMITS = {
+    "cells": (MIN_AREA_CELLS, MAX_AREA_CELLS),
+    "steps_per_cycle": (4, 12800),
+    "shear_modes": (1, inf),
+    "jumps": (1, inf),
+}
 # Names of all numerical settings that can be varied
 NUMERICAL_SETTINGS = ("element_size", *COUNT_LIMITS)
 # Keys of a scene that set what a curve varies
 SCENE_KEYS = {
     "contact.element_size": "element_size",
+    "contact.area.cells": "cells",
     "accuracy.steps_per_cycle": "steps_per_cycle",
     "accuracy.shear_modes": "shear_modes",
     "wear.jumps": "jumps",
@@ -27,6 +34,7 @@ COUNT_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 # Factors by which the number of cells of a uniform mesh is varied
 CELL_COUNT_FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0)
 CELL_COUNT_LIMITS = (8, 1600)  # numbers of cells of a uniform mesh along the interface
+DEFAULT_CELLS = 128  # middle number of cells along the longer side of a face
 DEFAULT_MIDDLE_COUNT = 8  # middle value of a count that the scene does not set
 # Name of the accuracy of all settings together, which a curve may vary in place of a single one.
 TOLERANCE_SETTING = "tolerance"
@@ -62,7 +70,8 @@ def find_applicable_settings(model: Model) -> list[str]:
     has_patch = model.patch is not None
     has_shear_modes = model.partial_slip and law_has_trait(model.friction.law, "bonds")
     applies = {
-        "element_size": has_patch and model.patch.mesh.file is None,
+        "element_size": has_patch and model.patch.mesh.file is None and model.patch.area is None,
+        "cells": has_patch and model.patch.area is not None,
         "steps_per_cycle": has_effect("steps_per_cycle", model.kind, engine_name),
         "shear_modes": has_shear_modes and has_effect("shear_modes", model.kind, engine_name),
         "jumps": has_patch and model.wear is not None,
@@ -107,6 +116,10 @@ def _change_setting(model: Model, name: str, value: float | None) -> Model:
     """
     if name == "element_size":
         return replace(model, patch=model.patch.with_element_size(value))
+    if name == "cells":
+        return replace(
+            model, patch=replace(model.patch, area=model.patch.area._replace(cells=value))
+        )
     if name == "jumps":
         return replace(model, wear=replace(model.wear, jumps=value))
     accuracy = model.accuracy.model_copy(update={name: value})
@@ -124,6 +137,8 @@ def _find_count(model: Model, name: str) -> int:
         if model.kind == "bench":
             return engine.steps_per_cycle(model)
         return numerics.choose_numerics(model).steps
+    if name == "cells":
+        return model.patch.area.cells or DEFAULT_CELLS
     return getattr(model.wear if name == "jumps" else model.accuracy, name) or DEFAULT_MIDDLE_COUNT
 
 

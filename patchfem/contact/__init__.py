@@ -54,7 +54,6 @@ PUBLIC = {
         "StripModel",
         "press_strips",
         "split_into_strips",
-        "compute_strip_offsets",
     ),
     "press_cases": (
         "HolderCases",

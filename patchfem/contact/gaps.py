@@ -44,17 +44,27 @@ SHAPE_PROPERTIES = {
 }
 
 
-def tilt(x: np.ndarray, angle: float) -> np.ndarray:
-    """Return the gap (m,) [m] of a tilted upper piece: the angle times the position x.
+def tilt(
+    x: np.ndarray, angle: float, roll: float | None = None, y: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Return the gap [m] of a tilted upper piece: the angle times x, plus the angle `roll` times y.
 
-    An angle [rad] > 0 opens the gap at +x.
+    An angle [rad] > 0 opens the gap at +x, and a roll > 0 at +y. The positions x and y [m] broadcast; y is 0 in a plane
+    patch.
     """
-    return angle * x
+    return angle * x if roll is None else angle * x + roll * y
 
 
-def crown(x: np.ndarray, radius: float) -> np.ndarray:
-    """Return the gap (m,) [m] of a crowned piece on a flat one: x^2/(2 radius), with radius [m] > 0."""
-    return x**2 / (2 * radius)
+def crown(
+    x: np.ndarray, radius: float, across: float | None = None, y: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Return the gap [m] of a crowned piece on a flat one: x^2/(2 radius) + y^2/(2 across).
+
+    Both radii are > 0 [m]; without `across` the crown is flat along y. The positions x and y [m] broadcast; y is 0 in a
+    plane patch.
+    """
+    along = x**2 / (2 * radius)
+    return along if across is None else along + y**2 / (2 * across)
 
 
 def step(x: np.ndarray, height: float, at: float) -> np.ndarray:

@@ -176,14 +176,6 @@ class StripsState:
         return self.roll_moment / self.load if self.load else 0.0
 
 
-def compute_strip_offsets(width: float, count: int) -> np.ndarray:
-    """Return the centres y (count,) [m] of equal strips that divide the width [m] of a pair of pieces.
-
-    y is 0 in the middle of the width.
-    """
-    return (np.arange(count) + 0.5) * (width / count) - width / 2
-
-
 class StripProperties(NamedTuple):
     """Properties of one strip with m nodes.
 
@@ -378,7 +370,7 @@ def _refuse_loose_holder(force, holder: Holder) -> None:
     is_rotation_free = holder.moment is not None and holder.spring == 0
     if is_rotation_free and is_loaded.any(axis=0).sum() < 2:
         raise NotConverged(
-            "contact.strips: the nodes that touch do not determine the rotation of the piece; lower "
+            "contact: the nodes that touch do not determine the rotation of the piece; lower "
             "contact.element_size or set contact.holder.rotational_stiffness"
         )
     if holder.roll_moment is not None and is_loaded.any(axis=1).sum() < 2:

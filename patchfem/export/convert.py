@@ -9,7 +9,7 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from . import lab, pieces, store
 from .charts.axes import PICTURE_ENDINGS
-from .fields import grids
+from .fields import grids, image
 from .fields.vtkhdf import VTKHDF_FILE, Frames, find_fields, read_frames
 from .lab import write
 
@@ -56,10 +56,15 @@ def export_results(
         grids.create_folder(out.parent)
         return write.export_histories(folder, out)
     _refuse_field_format(out, frame, histories=histories)
-    frames = read_frames(find_fields(folder))
+    path = find_fields(folder)
+    has_face = image.is_image(path)
+    frames = image.read_image(path) if has_face else read_frames(path)
     number = grids.find_frame(frames, frame)
     grids.create_folder(out.parent)
-    grids.export_frames(frames, out, number)
+    if has_face:
+        image.export_image(frames, out, number)
+    else:
+        grids.export_frames(frames, out, number)
     if out.suffix in SERIES_FORMATS:
         return f"{out}: {len(frames.times)} frames"
     return f"{out}: frame {number} of 0 to {len(frames.times) - 1}, {frames.times[number]:.6g} s"
@@ -132,23 +137,31 @@ def view_results(
             f"--frame: {out.suffix} shows all frames of the motion; use a .png for one frame"
         )
 
-    frames = read_frames(find_fields(folder))
+    path = find_fields(folder)
+    has_face = image.is_image(path)
+    frames = image.read_image(path) if has_face else read_frames(path)
     number = grids.find_frame(frames, frame)
     # the folder of an interface has fields alone
     has_summary = (folder / store.SUMMARY_FILE).is_file()
     title = store.read_summary(folder).title if has_summary else ""
     title = title or folder.resolve().name
+    if has_face and is_film:
+        raise PatchfemError(
+            f"{out}: a face is shown as a picture of one frame; write .png and give --frame"
+        )
     if out is None:
         _open_window(frames, number, title)
         return ""
     grids.create_folder(out.parent)
+    if has_face:
+        return image.write_face_picture(frames, number, title, out)
     if is_film:
         return pieces.write_film(frames, title, magnify, out)
     return pieces.write_picture(frames, number, title, magnify, out)
 
 
-def _open_window(frames: Frames, number: int, title: str) -> None:
-    """Open a window with the von Mises stress in both pieces.
+def _open_window(frames: "Frames | image.FaceFrames", number: int, title: str) -> None:
+    """Open a window with the von Mises stress in both pieces, or with the pressure over a face.
 
     `number` is the index of the frame to show, and `title` that of the window. Missing is raised if there is no screen.
     """
@@ -160,8 +173,14 @@ def _open_window(frames: Frames, number: int, title: str) -> None:
         )
     import pyvista as pv
 
-    parts = grids.make_grids(frames.blocks, number, float(frames.times[number]))
     plotter = pv.Plotter(title=f"patchfem: {title}")
+    if isinstance(frames, image.FaceFrames):
+        grid = grids.make_image_grid(frames, number)
+        plotter.add_mesh(grid, scalar_bar_args={"title": "normal stress [Pa]"})
+        plotter.view_xy()
+        plotter.show()
+        return
+    parts = grids.make_grids(frames.blocks, number, float(frames.times[number]))
     for side in ("lower", "upper"):
         bar = {"title": "von Mises stress [Pa]"}
         plotter.add_mesh(parts[side], scalars="von_mises", scalar_bar_args=bar)

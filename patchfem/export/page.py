@@ -89,8 +89,8 @@ def make_page(folders: list[Path]) -> str:
             path.name: FILE_DESCRIPTIONS.get(path.name) or FILE_DESCRIPTIONS.get(path.suffix)
             for path in paths
         }
-        if (folders[0] / store.FIELDS_FILE).is_file():
-            # only a run with fields has the modules that read them
+        if (folders[0] / store.FIELDS_FILE).is_file() and "y" not in first.data:
+            # only a run with fields of both pieces has the modules that read them
             from .fields.film import make_stress_panels
 
             drawn += make_stress_panels(folders[0] / store.FIELDS_FILE)

@@ -15,6 +15,7 @@ from ..disk.atomic_write import write_atomically
 from ..formatting import choose_axis_unit
 from ..runs.pieces import compute_pieces
 from .charts.axes import save_figure
+from .fields import image
 from .fields.blocks import make_blocks
 from .fields.film import contact_window, last_frames
 from .fields.vtkhdf import Frames
@@ -218,6 +219,10 @@ def draw_pieces(
 
 def draw_result(result, onto=None):
     """Draw the pieces of a run at its end; return the Axes, which are `onto` if it is given."""
+    if result.patch.model.area is not None:
+        faces = image.collect_face_frames(result)
+        figure = image.draw_face(faces, len(faces.times) - 1, onto=onto)
+        return onto or figure.axes[0]
     computed = compute_pieces(result)
     frames = Frames(Path(), computed.time, make_blocks(computed))
     figure, _ = draw_pieces(frames, np.array([len(computed.time) - 1]), onto=onto)

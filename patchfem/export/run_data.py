@@ -16,6 +16,7 @@ from .. import inputs, response, structure
 from ..core import PatchfemError, SineDrive
 from ..model import structure as structure_model
 from ..runs.accuracy_curve import compute_accuracy_curve
+from ..runs.patch import area_motion
 from ..runs.results.result import Result, patch_surface
 from .answer import Quantities, Quantity, Variable, Variables, encode_texts, make_columns
 
@@ -118,20 +119,11 @@ RUN_VARIABLES = {
     ),
     "mode": Row("mode", "", "mode or coordinate of the structure", "plan.model.rig.modes.names"),
     "period": Row("", "s", "period of the drive", "motion.period"),
-    "strip_offset": Row(
-        "strip", "m", "position of the strip across the width", "patch.strips.offsets"
-    ),
-    "strip_normal_stress": Row(
-        "strip x",
-        "Pa",
-        "normal stress of each strip, compression positive",
-        "patch.strips.pressure",
-    ),
     "event_time": Row("event", "s", "time of the event", "motion.events.time"),
     "event_interface": Row(
         "event",
         "1",
-        "number of the interface or strip from 1; 0 for a change of the drive",
+        "number of the interface or band from 1; 0 for a change of the drive",
         "motion.events.interface",
     ),
     "event_kind": Row(
@@ -373,8 +365,44 @@ def _collect_patch(result: Result) -> Variables:
         fields = {name: values[count:] for name, values in fields.items()}
         fields["time"] = fields["time"] - fields["time"][0]
     text = "gap of the unloaded surfaces, wear included"
-    data |= make_columns("strip x", {"unloaded_gap": (surface.unloaded_gap, "m", text)})
-    return data | _collect_frames(fields, surface)
+    data |= make_columns("x", {"unloaded_gap": (surface.unloaded_gap, "m", text)})
+    data |= _collect_frames(fields, surface)
+    if result.patch.model.area is None:
+        return data
+    return _spread_over_face(data | _collect_reversal(result), result.patch)
+
+
+def _collect_reversal(result: Result) -> Variables:
+    """Return the state of the cells of a face at the last reversal and their slip per cycle; {} without partial slip."""
+    reversal = area_motion.find_face_reversal(result)
+    if reversal is None:
+        return {}
+    text = "contact status at the last reversal of the slide"
+    status = Variable(("x",), reversal.status, "", text, STATUS_NAMES)
+    slip_text = "path of the slip of each cell in a cycle"
+    slip = Variable(("x",), reversal.slip_per_cycle, "m", slip_text)
+    return {"reversal_status": status, "slip_per_cycle": slip}
+
+
+def _spread_over_face(data: Variables, patch) -> Variables:
+    """Return variables over the cells of a face with the dimensions y and x in place of x alone.
+
+    `patch` is the AreaPatch of the face.
+    """
+    spread = {}
+    for name, variable in data.items():
+        if variable.dims[-1:] == ("x",):
+            values = variable.values.reshape(*variable.values.shape[:-1], *patch.shape)
+            variable = replace(variable, dims=(*variable.dims[:-1], "y", "x"), values=values)
+        spread[name] = variable
+    normal = patch.cells.normal
+    x_text = "position of the middle of the cells along the sliding direction"
+    y_text = "position of the middle of the cells across the sliding direction"
+    return (
+        spread
+        | make_columns("x", {"x": (normal.x, "m", x_text)})
+        | make_columns("y", {"y": (normal.y, "m", y_text)})
+    )
 
 
 def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame") -> Variables:
@@ -404,14 +432,13 @@ def _list_code_meanings(name: str) -> tuple[str, ...]:
 
 
 def _make_field(name: str, values, frame: str) -> Variable:
-    """Return a field along x over frames, and over strips if it has three dimensions.
+    """Return a field along x over frames.
 
     The `values` are in SI units. `name` is a key of `INTERFACE_FIELDS`, and `frame` the name of the dimension of the
     frames.
     """
     unit, text = INTERFACE_FIELDS[name]
-    dims = (frame, *("strip", "x")[3 - np.ndim(values) :])
-    return Variable(dims, np.asarray(values), unit, text, _list_code_meanings(name))
+    return Variable((frame, "x"), np.asarray(values), unit, text, _list_code_meanings(name))
 
 
 def _collect_face(face) -> Variables:
@@ -419,8 +446,11 @@ def _collect_face(face) -> Variables:
     number = face.number + 1
     frame = "frame" if face.fields["time"].size > 1 else "frame_at_rest"
     data = {}
-    for name, variable in _collect_frames(face.fields, face.surface, frame).items():
-        dims = tuple(f"x_{number}" if one == "x" else one for one in variable.dims)
+    own = _collect_frames(face.fields, face.surface, frame)
+    if face.patch.model.area is not None:
+        own = _spread_over_face(own, face.patch)
+    for name, variable in own.items():
+        dims = tuple(f"{one}_{number}" if one in ("x", "y") else one for one in variable.dims)
         shown = name if name == f"{frame}_time" else f"{name}_{number}"
         data[shown] = replace(variable, dims=dims)
     return data

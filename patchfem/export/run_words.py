@@ -110,6 +110,13 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
             parts += _describe_interfaces(result, measures, text)
         elif _is_nonzero(measures, name):
             part = text.format(_format_measure(name, measures))
+            patch_model = result.plan.model.patch
+            if (
+                name == "contact_fraction"
+                and patch_model is not None
+                and patch_model.area is not None
+            ):
+                part = part.replace("of the length", "of the face")
             if (kind, name) == ("patch", "contact_fraction"):
                 part += _describe_place(details.get("contact"), " ({})")
             if name == "worn_depth_max" and result.plan.model.patch.gap.is_split:
@@ -181,8 +188,8 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
     message = response.outcome.OPEN_LOOP_MESSAGE
     if any(warning.startswith(message) for warning in result.warnings):
         text = "friction work of the last cycle {}"
-    has_strips = any(name == "contact.strips" for name in result.plan.effects)
-    where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
+    is_one = result.plan.model.patch is not None
+    where = "" if len(names) == 1 or is_one else f" at interface 1 of {len(names)}"
     return [text.format(_format_measure(names[0], measures)) + where]
 
 
@@ -392,7 +399,7 @@ def describe_accuracy(result: Result, measures: Quantities) -> str:
         for name, ratio in ratios.items()
         if name not in RUN_CHECK_MEASURES and "±" in _format_measure(name, measures)
     }
-    # Some measures, as of strips, have a value without an error.
+    # Some measures have a value without an error.
     errors = [one.error for one in result.measures.values() if one.value is not None]
     within = f"All{' stated' * (None in errors)} errors are within the tolerance {tolerance:g}"
     if not visible:

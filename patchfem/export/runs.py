@@ -174,10 +174,11 @@ def _list_effects(result: Result) -> list[JsonObject]:
 def _find_contact(result: Result) -> JsonObject:
     """Return {"from", "to": ends of the interface [m], "stretches": (start, end) [m] of each part in contact}.
 
-    The dict is empty for a patch without contact or with strips.
+    The dict is empty for a patch without contact, and for a face.
     """
     patch = result.patch
-    if patch is None or patch.strips is not None or not patch.active.any():
+    is_plane = patch is not None and patch.model.area is None
+    if not is_plane or not patch.active.any():
         return {}
     if patch.points is not None:
         intervals = patch.points.intervals

@@ -129,7 +129,7 @@ def read_end_state(path: Path) -> EarlierWear:
     Raises
     ------
     PatchfemError
-        If the file is not that of a run with [wear] over a patch without strips.
+        If the file is not that of a run with [wear] over a plane patch.
     """
     import h5py
 
@@ -146,7 +146,6 @@ def read_end_state(path: Path) -> EarlierWear:
                 scene=tomllib.loads(file.attrs["scene"]),
                 measures=json.loads(file.attrs["measures"]),
             )
-        has_strips = "strips" in earlier.scene["contact"]
         is_usable = _has_depth_along_patch(earlier) and "cycles" in earlier.scene["wear"]
     except FOREIGN_ERRORS:
         raise PatchfemError(
@@ -155,12 +154,6 @@ def read_end_state(path: Path) -> EarlierWear:
         ) from None
 
     # What the file has but this run cannot use.
-    if has_strips:
-        raise PatchfemError(
-            f"{path}: that run has strips, and wear of strips cannot be continued yet; choose a run "
-            "without [contact.strips]",
-            WEAR_START_KEY,
-        )
     if not is_usable:
         raise PatchfemError(
             f"{path}: the worn depth in this file is not a list of depths along a patch; run that "

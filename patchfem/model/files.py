@@ -19,6 +19,7 @@ from ..scene.rules.structure import MATRIX_KEYS
 from . import (
     drive,
     earlier_wear,
+    face,
     gap,
     patch,
     peaks,
@@ -156,6 +157,18 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
     return notes
 
 
+def _check_scan(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
+    """Check the areal scan in the file `path`, and return notes about it.
+
+    If the `tables` of the scene are valid (`is_valid`), it must also cover half of the face.
+    """
+    if not is_valid:
+        face.read_scan(path)
+        return ()
+    contact = tables.contact
+    return face.read_face(path, contact.profile.at, contact.length, contact.width).notes
+
+
 def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
     """Check the file `path` of a recorded drive signal, or of its spectrum, by reading it.
 
@@ -229,6 +242,7 @@ FILE_CHECKS = {
     "contact.mesh": _check_mesh,
     "contact.asperities.from": _check_asperities,
     "contact.profile.file": _check_profile,
+    "contact.profile.scan": _check_scan,
     "slide.file": _check_by_reading(lambda path: slide.read_path_file(path)),
     "drive.file": _check_drive,
     "structure.file": _check_structure,

@@ -84,6 +84,12 @@ class Gap:
         return next((angle for keys, angle in self._values("angle") if keys.on == "upper"), 0.0)
 
     @property
+    def roll(self) -> float:
+        """Prescribed angle [rad] of the upper piece about x."""
+        angles = (keys.roll for keys, _ in self._values("angle") if keys.on == "upper")
+        return next(angles, 0.0) or 0.0
+
+    @property
     def tilt(self) -> float | None:
         """Absolute angle [rad] between the pieces, or None if they are not tilted."""
         return next((abs(angle) for _, angle in self._values("angle")), None)

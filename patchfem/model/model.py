@@ -13,7 +13,7 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..core import PatchfemError
-from ..effects import law_has_trait, list_absent_effects
+from ..effects import law_has_trait, list_absent_effects, needs_bond_list
 from ..formatting import format_quantity
 from ..scene.keys.memoize import memoize
 from ..scene.keys.tables import Accuracy, Friction
@@ -244,7 +244,10 @@ def _build(scene: Scene) -> Model:
         edge_motion = _find_edge_motion(scene, rig_model)
         is_fine = rig_model is None and scene.wear is None
         patch_model = patch_model.with_mesh(edge_motion=edge_motion, is_fine=is_fine)
-        if path is not None and grooves is None:
+        if patch_model.area is not None:
+            area = patch_model.area._replace(max_cells=_find_max_cells(scene, patch_model))
+            patch_model = replace(patch_model, area=area)
+        elif path is not None and grooves is None:
             patch_model = _request_slip_mesh(patch_model, path, law.friction)
 
     # The source is added last, because the resolved scene has defaults that follow from the model.
@@ -277,6 +280,18 @@ def _build(scene: Scene) -> Model:
     )
     model = replace(model, source=source)
     return model if model.has_bolted_patch else model.state_subtracted_joint()
+
+
+def _find_max_cells(scene: Scene, patch_model: PatchModel) -> int:
+    """Return the largest number of cells along a face that a run of a scene chooses by itself."""
+    if scene.kind == "patch":
+        return patch.MAX_STATIC_CELLS
+    has_bonds = law_has_trait(scene.friction.law, "bonds")
+    if has_bonds and patch_model.interface.partial_slip and needs_bond_list(scene.friction):
+        return patch.MAX_LIST_CELLS
+    if scene.wear is not None or (has_bonds and patch_model.interface.partial_slip):
+        return patch.MAX_POINT_CELLS
+    return patch.MAX_SLIP_CELLS
 
 
 def _attach_bolted_model(scene: Scene, rig_model: Rig) -> Rig:

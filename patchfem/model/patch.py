@@ -14,6 +14,13 @@ from .gap import N_DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap
 if TYPE_CHECKING:
     from ..mesh.pieces import Mesh
 
+# Largest number of cells along the longer side of a face that is only pressed, of one whose slip is followed by parallel
+# elements, of one whose cells are contact points of a law with memory or wear in many jumps, and of one whose cells have
+# lists of bonds; each takes about 10 CPU s.
+MAX_STATIC_CELLS = 512
+MAX_SLIP_CELLS = 256
+MAX_POINT_CELLS = 64
+MAX_LIST_CELLS = 32
 TYPICAL_N_NODES = 160  # number of interface nodes that a patch takes at the default tolerance
 EQUAL_LENGTHS_TOL = 1e-9  # largest relative difference of equal lengths
 
@@ -141,6 +148,7 @@ class PatchLoading:
     - can_rotate: whether the upper piece is free to rotate.
     - rotational_stiffness: stiffness [N m/rad] of the holder.
     - tangential_stiffness: stiffness [N/m] of the holder, None if it is rigid.
+    - across: distance [m] of the load line from the middle along y; None if the upper piece cannot rotate about x.
     """
 
     load: float | None
@@ -150,6 +158,7 @@ class PatchLoading:
     can_rotate: bool
     rotational_stiffness: float
     tangential_stiffness: float | None
+    across: float | None = None
 
     @property
     def moment(self) -> float | None:
@@ -159,22 +168,39 @@ class PatchLoading:
         return self.line_moment if self.line_moment is not None else self.load * self.offset
 
 
-class PatchStrips(NamedTuple):
-    """Strips of a patch across its width.
+class PatchArea(NamedTuple):
+    """Face on which pressure and slip vary along x and y.
 
-    - roll: angle [rad] about the x axis.
-    - offset: lateral position [m] of the load line, None if the piece cannot roll.
-    - count: number of equal strips.
+    - cells: number of cells along the longer side; None: as many as the tolerance needs.
+    - hardness: largest pressure [Pa]; None without a limit.
+    - scan: measured heights over the face, or None.
+    - max_cells: largest number of cells along the longer side that is chosen without `cells`.
     """
 
-    count: int
-    roll: float
-    offset: float | None
+    cells: int | None
+    hardness: float | None
+    scan: "ScanFile | None"
+    max_cells: int = MAX_SLIP_CELLS
+
+
+class ScanFile(NamedTuple):
+    """Areal scan of a face.
+
+    - path: file.
+    - at: place (x, y) [m] of the middle of the patch in the file; None for the middle of the scan.
+    - is_material: whether a peak closes the gap.
+    - file: name of the file in the scene.
+    """
+
+    path: Path
+    at: tuple[float, float] | None
+    is_material: bool
+    file: str
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchInterface:
-    """Interface of a patch: asperity layer, strips and shear compliance.
+    """Interface of a patch: asperity layer and shear compliance.
 
     - has_shear: whether the pieces deform in shear.
     - partial_slip: key of the scene that allows partial slip, "" without partial slip.
@@ -182,7 +208,6 @@ class PatchInterface:
     """
 
     skin: Asperities | None
-    strips: PatchStrips | None
     has_shear: bool
     partial_slip: str
 
@@ -246,8 +271,9 @@ class PatchModel:
     - pieces: shape and material of both pieces.
     - gap: gap between them before they are loaded.
     - loading: what presses them together.
-    - interface: asperity layer, strips and shear compliance.
+    - interface: asperity layer and shear compliance.
     - mesh: how they are meshed.
+    - area: cells of a face on which the pressure also varies along y; None for a plane patch.
     """
 
     pieces: PatchPieces
@@ -255,6 +281,7 @@ class PatchModel:
     loading: PatchLoading
     interface: PatchInterface
     mesh: PatchMesh
+    area: PatchArea | None = None
 
     @property
     def has_singular_ends(self) -> bool:
@@ -296,7 +323,7 @@ class PatchModel:
         """Return a copy of the patch with an element size [m]; None: the mesh is refined to the tolerance."""
         gap = self.gap
         if not gap.is_rough and self.mesh.file is None:
-            lengths = _average_over_cells(size, self.interface.strips, self.pieces)
+            lengths = _average_over_cells(size, self.pieces)
             gap = replace(gap, average=lengths.average, limit=lengths.limit)
         return replace(self, mesh=replace(self.mesh, element_size=size), gap=gap)
 
@@ -327,7 +354,7 @@ def build_patch(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchM
     PatchModel
     """
     pieces = build_pieces(contact)
-    trace = contact.profile
+    trace = contact.profile if contact.area is None else None
     lengths = find_profile_lengths(contact, pieces)
     gap = Gap(
         shapes=list_gap_shapes(contact),
@@ -345,20 +372,33 @@ def build_patch(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchM
     if skin is not None and skin.law == "hertz":
         cutoff = find_shortest_wavelength(contact, pieces.length)
         skin = peaks.complete_asperities(skin, resolve_path, cutoff)
-    strips = contact.strips
-    if strips is not None:
-        strips = PatchStrips(strips.count, strips.roll, strips.offset)
 
     return PatchModel(
         pieces=pieces,
         gap=gap,
         loading=_build_loading(contact),
-        interface=PatchInterface(skin, strips, contact.shear is not None, contact.compliance_key),
+        interface=PatchInterface(skin, contact.shear is not None, contact.compliance_key),
         mesh=PatchMesh(
             element_size=contact.element_size,
             file=find_mesh_file(contact, resolve_path),
         ),
+        area=_build_area(contact, resolve_path),
     )
+
+
+def _build_area(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchArea | None:
+    """Return the cells of a face that a table [contact] describes; None for a plane patch.
+
+    `resolve_path` turns a file name in the scene into a path.
+    """
+    if contact.area is None:
+        return None
+    profile = contact.profile
+    scan = None
+    if profile is not None:
+        is_material = profile.heights == "surface"
+        scan = ScanFile(resolve_path(profile.scan), profile.at, is_material, profile.scan)
+    return PatchArea(contact.area.cells, contact.area.hardness, scan)
 
 
 def find_mesh_file(contact: Contact, resolve_path: Callable[[str], Path]) -> MeshFile | None:
@@ -433,9 +473,10 @@ def _build_loading(contact: Contact) -> PatchLoading:
         approach=contact.approach.distance if contact.approach is not None else None,
         offset=line.offset if line is not None else None,
         line_moment=line.moment if line is not None else None,
-        can_rotate=line is not None,
+        can_rotate=line is not None and (line.offset is not None or line.moment is not None),
         rotational_stiffness=(holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
         tangential_stiffness=(holder.tangential_stiffness or None) if holder is not None else None,
+        across=line.across if line is not None else None,
     )
 
 
@@ -451,18 +492,18 @@ def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLength
         return ProfileLengths(average, None)
     if contact.mesh is not None:
         return ProfileLengths(None, 0.0)
-    return _average_over_cells(contact.element_size, contact.strips, pieces)
+    return _average_over_cells(contact.element_size, pieces)
 
 
-def _average_over_cells(size: float | None, strips, pieces: PatchPieces) -> ProfileLengths:
+def _average_over_cells(size: float | None, pieces: PatchPieces) -> ProfileLengths:
     """Return the lengths over which a profile is averaged on a mesh with an element size [m], or on an automatic one.
 
-    An automatic mesh resolves the whole file. Where the finest waves cannot be solved apart (strips, pieces that reach
-    beyond the interface), its cells are those of an even mesh at most.
+    An automatic mesh resolves the whole file. Where the finest waves cannot be solved apart (pieces that reach beyond the
+    interface), its cells are those of an even mesh at most.
     """
     if size:
         return ProfileLengths(size, size)
-    if strips is None and not pieces.has_overhang:
+    if not pieces.has_overhang:
         return ProfileLengths(None, None)
     return ProfileLengths(None, pieces.length / N_DEFAULT_CELLS)
 

@@ -31,7 +31,7 @@ from .structure import (
     find_known_joint,
     has_pressed_joint,
     name_joint_source,
-    needs_strip_displacements,
+    needs_band_displacements,
     read_file_notes,
 )
 
@@ -97,13 +97,13 @@ class RigFriction:
     - interfaces: friction laws of the interfaces, empty in a linear rig.
     - names: names of the interfaces between masses, empty in other rigs.
     - load_varies: whether the normal load changes with the motion or in time.
-    - strips_slide_apart: whether a mode yaws the patch, so the strips have different displacements.
+    - bands_slide_apart: whether a mode yaws a face, so that its bands have different displacements.
     """
 
     interfaces: tuple[InterfaceLaw, ...]
     names: tuple[str, ...]
     load_varies: bool
-    strips_slide_apart: bool
+    bands_slide_apart: bool
 
     @property
     def has_partial_slip(self) -> bool:
@@ -362,7 +362,7 @@ def _build(
         interfaces=interfaces,
         names=tuple(make_interface_names(scene.structure)),
         load_varies=bool(interfaces and find_load_change_key(scene)),
-        strips_slide_apart=needs_strip_displacements(scene),
+        bands_slide_apart=needs_band_displacements(scene),
     )
     return Rig(
         modes=modes,

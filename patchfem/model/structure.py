@@ -24,6 +24,8 @@ from .law import InterfaceLaw, build_interface_laws, find_normal_load
 from .source import name_key
 
 # What is subtracted from bolted modes, by `name_joint_source`
+# Number of bands of cells across a face that slide by themselves if it yaws; each is an interface of the motion.
+N_YAW_BANDS = 8
 JOINT_WORDS = {
     "given": "structure.measured_stiffness",
     "written": "the stiffness of the joint of the scene as written",
@@ -91,11 +93,10 @@ def build_modes(scene, unbonded: ModalBasis | None = None) -> ModalBasis:
         If a file lacks something, or if a bonded spring has no single interface to act on.
     """
     modes = build_modes_without_bond(scene) if unbonded is None else unbonded
-    # A mode that yaws the patch gives each strip its own displacement, which is that at its middle.
-    if needs_strip_displacements(scene):
-        count = scene.contact.strips.count
-        offsets = ((np.arange(count) + 0.5) / count - 0.5) * scene.contact.width
-        modes = replace(modes, faces=frozen_array(compute_strip_slides(modes, offsets)))
+    # A mode that yaws a face gives each band of cells its own displacement, which is that at its middle.
+    if needs_band_displacements(scene):
+        offsets = compute_band_offsets(scene.contact.width)
+        modes = replace(modes, faces=frozen_array(compute_band_slides(modes, offsets)))
     if modes.faces is not None and not len(modes.faces):
         # Without an interface there is no friction, and the motion of
         # the output replaces the slide.
@@ -366,27 +367,29 @@ def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
     return modal if modes.shapes is None else modal @ modes.shapes.T
 
 
-def needs_strip_displacements(scene) -> bool:
-    """Return whether a mode of a scene yaws a patch with strips.
-
-    The strips then have different displacements.
-    """
-    has_strips = scene.contact is not None and scene.contact.strips is not None
-    return has_strips and scene.friction is not None and bool(find_yaw_key(scene))
+def needs_band_displacements(scene) -> bool:
+    """Return whether a mode of a scene yaws a face, whose bands of cells then have different displacements."""
+    has_face = scene.contact is not None and scene.contact.area is not None
+    return has_face and scene.friction is not None and bool(find_yaw_key(scene))
 
 
-def compute_strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
-    """Compute the relative displacement of each strip per modal coordinate: slide - y yaw.
+def compute_band_offsets(width: float) -> np.ndarray:
+    """Return the distances y (N_YAW_BANDS,) [m] of the bands from the middle of a face of a width [m]."""
+    return ((np.arange(N_YAW_BANDS) + 0.5) / N_YAW_BANDS - 0.5) * width
+
+
+def compute_band_slides(modes: ModalBasis, offsets) -> np.ndarray:
+    """Compute the relative displacement of each band per modal coordinate: slide - y yaw.
 
     A positive yaw turns +x towards +y, so that a piece at +y moves backwards. The friction forces f of
-    the strips, which resist, exert the moment sum y f about +z on the upper piece.
+    the bands, which resist, exert the moment sum y f about +z on the upper piece.
 
     Parameters
     ----------
     modes : ModalBasis
         Modes of the rig, with their yaw.
     offsets : (s,) array_like
-        Distance y [m] of each strip from the middle of the patch.
+        Distance y [m] of each band from the middle of the patch.
 
     Returns
     -------

@@ -83,7 +83,7 @@ def find_segment_borders(drive) -> list[float]:
 
 
 def is_all_stuck(window, max_stick_slip: float) -> bool:
-    """Return whether no interface or strip slips by more than a given distance [m] in a window.
+    """Return whether no interface or band slips by more than a given distance [m] in a window.
 
     The limit applies to half the range of the slip, and is at least its round-off.
     """

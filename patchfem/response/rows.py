@@ -54,7 +54,7 @@ class LastCycles:
     - reversal_rule: rule for the friction force at a reversal of the displacement (see
       `loops.find_reversals`).
     - slide_round_off: largest half range of the relative displacement that is round-off [m].
-    - is_single_interface: whether the columns `slides` of the window are strips of a single interface.
+    - is_single_interface: whether the columns `slides` of the window are bands of a single interface.
     """
 
     window: Response

@@ -48,7 +48,6 @@ PUBLIC = {
     "patch.faces": ("has_error_meshes",),
     "patch.jenkins_elements": ("elements",),
     "patch.mesh_levels": ("solve_with_coarser",),
-    "patch.press": ("nodal_areas",),
     "probe": ("run_probe",),
     "patch.result": ("make_piece_meshes_of_run",),
     "patch.values": (

@@ -16,6 +16,7 @@ from ..core import Measure
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..model.model import Model
+from ..scene.keys.contact import MAX_AREA_CELLS
 from . import refine
 from .patch import mesh_levels
 from .results import notes, patch_rows
@@ -191,6 +192,8 @@ def _advise_mesh(
         Whether the missed measures are those on which the mesh is refined.
     """
     n_nodes = max(patches[0].x.size for _, patches in solved)
+    if any(patch_model.area is not None for patch_model, _ in solved):
+        return _advise_cells(solved, name)
     cause = f"the {name} ({n_nodes} interface nodes) causes this error; "
     if any(patch_model.mesh.file is not None for patch_model, _ in solved):
         return Advice(f"{cause}split the elements of contact.mesh", "contact.mesh")
@@ -209,6 +212,19 @@ def _advise_mesh(
         )
     text = f"{cause}set accuracy.tolerance = {tolerance:.3g} for a finer mesh"
     return Advice(text, "accuracy.tolerance", tolerance)
+
+
+def _advise_cells(solved, name: str) -> Advice:
+    """Return the advice to use more cells over a face.
+
+    `solved` are pairs of a PatchModel and its patches, from fine to coarse, and `name` is that of the mesh.
+    """
+    n_cells = max(patches[0].shape for _, patches in solved)
+    longer = max(n_cells)
+    cause = f"the {name} ({n_cells[1]} x {n_cells[0]} cells) causes this error; "
+    if 2 * longer > MAX_AREA_CELLS:
+        return Advice(f"{cause}{USE_ERROR_ADVICE}")
+    return Advice(f"{cause}set contact.area.cells = {2 * longer}", "contact.area.cells", 2 * longer)
 
 
 def _advise_limit(missed: Missed, purpose: str, cause: str = "") -> Advice:

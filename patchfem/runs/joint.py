@@ -24,7 +24,7 @@ from ..model.model import Model
 from ..model.source import Source, locate_errors
 from ..model.structure import compute_sticking_stiffness
 from ..slip.edge_springs import add_edge_springs
-from .patch import mesh_levels, store
+from .patch import area_slip, mesh_levels, store
 from .patch.press import Patch, Patches
 
 # Largest logarithm of the factor by which the compliance of a patch is scaled.
@@ -240,17 +240,13 @@ def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
     bond_length : float
         Bond length of the law over its coefficient of friction [m].
     """
-    forces = [patch.pressure.sigma_n * patch.pieces.interface.weight]
-    if patch.strips is not None:
-        forces = patch.strips.force
-    # The compliance of a strip is inversely proportional to its fraction of the width.
-    compliance = factor * len(forces) * patch.slip_compliance
-    total = 0.0
-    for force in forces:
-        points = np.flatnonzero(force > 0)
-        nodal = compliance[np.ix_(points, points)] + np.diag(bond_length / force[points])
-        total += float(np.linalg.solve(nodal, np.ones(points.size)).sum())
-    return total
+    if patch.model.area is not None:
+        return area_slip.compute_stick_stiffness(patch, factor, bond_length)
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    points = np.flatnonzero(force > 0)
+    nodal = factor * patch.slip_compliance[np.ix_(points, points)]
+    nodal += np.diag(bond_length / force[points])
+    return float(np.linalg.solve(nodal, np.ones(points.size)).sum())
 
 
 def _match_stiffness(
@@ -277,10 +273,11 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
     """Return the tangential compliance (m, m) [m/N] of a patch with a given stiffness [N/m] in full stick.
 
     `bond_length` [m] is that of the friction law, whose bonds are in series with the pieces; 0 for rigid contact.
-    Nodes at the edges of a contact have soft bonds, and strips do not share their edges; the whole compliance of
+    Nodes at the edges of a contact have soft bonds; the whole compliance of
     such patches is scaled. It is returned unchanged if the bonds alone determine the stiffness.
     """
-    if patch.strips is None and not bond_length:
+    is_plane = patch.model.area is None
+    if is_plane and not bond_length:
         return add_edge_springs(patch.slip_compliance, patch.pressure.sigma_n > 0, stiffness)
 
     def excess(log_factor: float) -> float:
@@ -290,12 +287,14 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
     if not excess(-MAX_LOG_COMPLIANCE_FACTOR) > 0 > excess(MAX_LOG_COMPLIANCE_FACTOR):
         return patch.slip_compliance
 
-    # scipy.optimize takes half a second to import, and most joints have no bonds and no strips.
+    # scipy.optimize takes half a second to import, and most joints have no bonds.
     from scipy.optimize import brentq
 
     factor = np.exp(
         brentq(excess, -MAX_LOG_COMPLIANCE_FACTOR, MAX_LOG_COMPLIANCE_FACTOR, xtol=1e-14)
     )
+    if not is_plane:
+        return patch.slip_compliance.scale(factor)
     return frozen_array(factor * patch.slip_compliance)
 
 

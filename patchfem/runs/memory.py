@@ -17,7 +17,6 @@ from .rig import engines, numerics
 
 BYTES_PER_STATIC_NODE = 4.6e3  # per node of the pieces of a static patch, to condense them [bytes]
 BYTES_PER_MOVING_NODE = 8.1e3  # the same, with the frames of a motion [bytes]
-BYTES_PER_STRIP_NODE = 3e3  # per strip and interface node [bytes]
 BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide [bytes]
 # Per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
 BYTES_PER_MODE_PAIR = 125.0
@@ -81,11 +80,6 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
         MemoryPart(refine.PROGRAM_BYTES, "packages and compiled code"),
         MemoryPart(size, f"{points} nodes of the interface", remedy),
     ]
-    layers = [patch.interface.strips for patch in patches]
-    if strips := max((layer.count for layer in layers if layer is not None), default=0):
-        size = BYTES_PER_STRIP_NODE * strips * points
-        parts.append(MemoryPart(size, f"{strips} strips of them", "lower contact.strips.count"))
-
     # The histories of a motion count by its stored samples, which the scene may set by the steps.
     has_steps = model.accuracy.steps_per_cycle is not None
     if model.slide is not None:

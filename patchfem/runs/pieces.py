@@ -53,7 +53,7 @@ class Pieces(NamedTuple):
     - lower, upper: fields of the pieces.
     - x (k,): positions along the interface [m].
     - weight (k,): areas [m2]; weight times normal stress adds up to the load.
-    - interface: fields by name, (f, k), (f, k, 2) or for strips (f, s, k).
+    - interface: fields by name, (f, k) or (f, k, 2).
     - width: width of the pieces [m].
     """
 

@@ -22,7 +22,7 @@ from . import joint, memory, refine
 from .balances import mark_unbalanced
 from .bench import result as bench_result
 from .findings import find_missed_measures
-from .patch import faces, mesh_levels, store, strength
+from .patch import area_motion, faces, mesh_levels, store, strength
 from .patch import result as patch_result
 from .plan import Plan, plan
 from .results.interfaces import Face, merge_sentences
@@ -265,6 +265,8 @@ class _Passes:
         # Static measures come first, and those of wear last.
         if run_plan.kind != "patch":
             result = _add_static_measures(result, moved.faces)
+            if run_plan.model.patch is not None and run_plan.model.patch.area is not None:
+                result = area_motion.add_reversal_measure(result, moved.coarse[0])
         if run_plan.model.wear is not None:
             result = measures.add_wear_measures(
                 replace(result, plan=run_plan), worn_patch, self.estimate
@@ -333,7 +335,7 @@ def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
     """Return a Result that begins with the static measures of all pressed interfaces, such as their peak pressures."""
     static: Measures = {}
     for face in pressed:
-        for name, measure in patch_result.static_measures(face.model, face.patch).items():
+        for name, measure in face.patch.measures.items():
             static[face.name_measure(name)] = measure
     motion = {name: m for name, m in result.measures.items() if name not in static}
     return replace(result, measures=static | motion)
@@ -423,8 +425,8 @@ def _complete_result(done: FinishedPass) -> Result:
     patch = result.patch
     if patch is not None:
         patch = replace(patch, frames=result.fields)
-    # A number after the name of a measure counts the strips of a patch, or else the interfaces.
-    part = "interface" if model.patch is None else "strip"
+    # A number after the name of a measure counts the bands of a face, or else the interfaces.
+    part = "interface" if model.patch is None else "band"
     described = {}
     for name, measure in result.measures.items():
         described[name] = replace(measure, text=describe_measure(name, part))

@@ -10,6 +10,7 @@ TEMPLATE_FOLDER = Path(__file__).parent / "templates"
 # Description of each template scene, by its kind
 TEMPLATE_DESCRIPTIONS = {
     "patch": "two coated pieces pressed together: contact area, pressure and stiffness",
+    "area": "a crowned pad pressed off centre: pressure, stick and slip over the face",
     "joint": "a bolted lap joint moved to and fro: friction loop, stiffness and damping",
     "bench": "a friction law at one contact point, along a prescribed slide",
     "rig": "a rubbing block on flexures, shaken at one frequency",

@@ -361,14 +361,28 @@ def _compute_all_modes(tangential, friction_limit, steepest_fall: float) -> Shea
         shape = vectors[:, ::-1] / root
         compliance = values[::-1]
 
-    stability = compliance[0] * steepest_fall
+    modes = ShearModes(points, friction_limit, shape, 1 / compliance)
+    require_stability(modes, steepest_fall)
+    return modes
+
+
+def require_stability(modes: ShearModes, steepest_fall: float) -> None:
+    """Raise PatchfemError if a weakening contact could slip suddenly.
+
+    Parameters
+    ----------
+    modes : ShearModes
+        The most compliant mode comes first.
+    steepest_fall : float
+        Steepest fall of the friction force of a node over its slip, relative to its friction limit [1/m].
+    """
+    stability = steepest_fall / modes.stiffness[0]
     if stability >= 1:
         raise PatchfemError(
             "friction.kinetic below static: the patch may slip suddenly without a change of the force on it, because the "
             f"friction force falls over the slip {stability:.3g} times as steeply as the pieces and the holder relax (the "
             "limit is 1); raise friction.bond_length or friction.kinetic, or make the holder stiffer"
         )
-    return ShearModes(points, friction_limit, shape, 1 / compliance)
 
 
 def estimate_force_errors(modes: ShearModes, bond_length: float) -> np.ndarray:

@@ -10,7 +10,12 @@ from .profile import Profile
 
 MEANS_OVER_WAVES_NOTE = "means over the waves of the trace"
 # Parts of the notes that cast no doubt on a result.
-HARMLESS_NOTE_PARTS = ("the trace is centred on the patch", MEANS_OVER_WAVES_NOTE, "is rounded to")
+HARMLESS_NOTE_PARTS = (
+    "the trace is centred on the patch",
+    MEANS_OVER_WAVES_NOTE,
+    "is rounded to",
+    "heights of spikes were removed",
+)
 N_POSITION_DIGITS = 11  # number of digits of x [m] in notes, which state no round-off
 # Largest number of elements that a trace may lack at either end, with round-off.
 MAX_MISSING_END_ELEMENTS = 0.5000001

@@ -21,7 +21,7 @@ MIN_HEIGHT_RANGE = 1e-12  # range of heights [m] below which an unworn surface i
 
 
 class PatchState(NamedTuple):
-    """Surface of a patch at the end of a run; fields are (m,), or (s, m) with strips.
+    """Surface of a patch at the end of a run; fields are (m,), or (s, m) over a face.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class PatchState(NamedTuple):
     x : (m,) array
         Nodes [m].
     y : (s,) array or None
-        Middles of the strips [m].
+        Middles of the rows of cells [m].
     area, gap, depth : array
         Areas of the nodes [m2]; gap of the unloaded surfaces with wear, and worn depth so far [m].
     measures : dict
@@ -59,7 +59,7 @@ class Wear(NamedTuple):
     depth : array
         Depth [m] worn between them.
     values, track : dict of str to Quantity
-        Quantities of the patch, and of its worn part ({} with strips).
+        Quantities of the patch, and of its worn part ({} over a face).
     hidden : tuple of float
         Hidden wear [m] at the ends or corners of the patch.
     error : float
@@ -93,7 +93,7 @@ def measure_wear(first: PatchState, second: PatchState) -> Wear:
     """
     _require_same_patch(first, second)
     x = second.x
-    depth = second.depth - _interpolate(x, first.x, first.depth)
+    depth = second.depth - _move_to(second, first, first.depth)
     area = float(second.area.sum())
     length = float(np.ptp(x))
     volume, volume_error = _measure_change(first, second, "worn_volume")
@@ -133,7 +133,7 @@ def _require_same_patch(first: PatchState, second: PatchState) -> None:
         raise PatchfemError(f"{both}: {', '.join(unlike)} differ")
 
     # tables may name files that changed, so the unworn gaps are compared too
-    unworn = [_interpolate(second.x, state.x, state.gap - state.depth) for state in (first, second)]
+    unworn = [_move_to(second, state, state.gap - state.depth) for state in (first, second)]
     difference = float(np.abs(unworn[0] - unworn[1]).max())
     if difference > GAP_DIFFERENCE_FRACTION * float(np.ptp(unworn[1])) + MIN_HEIGHT_RANGE:
         raise PatchfemError(
@@ -144,6 +144,14 @@ def _require_same_patch(first: PatchState, second: PatchState) -> None:
         raise PatchfemError(
             f"{first.source} is worn more than {second.source}; give the less worn run as the first folder"
         )
+
+
+def _move_to(target: PatchState, state: PatchState, values) -> np.ndarray:
+    """Interpolate values of a state, (m,) or (s, m), to the positions of another state of the same patch."""
+    moved = _interpolate(target.x, state.x, values)
+    if target.y is None or np.array_equal(target.y, state.y):
+        return moved
+    return _interpolate(target.y, state.y, moved.T).T
 
 
 def _interpolate(x, given_x, values) -> np.ndarray:

@@ -34,8 +34,6 @@ class WearProblem:
     - area: areas (m,) [m2] of the nodes
     - coefficient: wear coefficient [m2/N]
     - cycles: total number of cycles
-
-    In a patch of s strips, arrays (m,) are (s, m).
     """
 
     press: Press

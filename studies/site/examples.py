@@ -131,7 +131,7 @@ EXAMPLES = {
     "contact.load_line": (PATCH, '[contact.load_line]\noffset = "1 mm"\n'),
     "contact.crown": (PATCH, '[contact.crown]\nradius = "10 m"\n'),
     "contact.profile": (PATCH, '[contact.profile]\nfile = "trace.csv"\nheights = "surface"\n'),
-    "contact.strips": (PATCH, '[contact.strips]\ncount = 8\nroll = "0.02 mrad"\n'),
+    "contact.area": (PATCH, "[contact.area]\ncells = 64\n"),
     "contact.shear": (
         PATCH + '[contact.crown]\nradius = "10 m"\n' + LAW + SLIDE,
         "[contact.shear]\n",

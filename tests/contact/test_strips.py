@@ -21,7 +21,6 @@ from patchfem.contact import (
     HertzAsperities,
     LinearAsperities,
     StripCompliance,
-    compute_strip_offsets,
     split_into_strips,
 )
 from patchfem.contact.press import STRIP_RESIDUAL_TOL
@@ -41,17 +40,22 @@ CONTROLS = {
 each_control = pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
 
 
+def compute_strip_offsets(n_strips):
+    """Return the centres y (count,) [m] of equal strips that divide the width; y is 0 in its middle."""
+    return (np.arange(n_strips) + 0.5) * (WIDTH / n_strips) - WIDTH / 2
+
+
 def pair_strips(n_strips, n_elements=60):
     """Return (normal, x, weight, offsets) of strips of the coated pair."""
     pair = make_coated_pair(n_elements)
     c, _, weight = split_into_strips(pair, n_strips)
-    return c, pair.interface.x, weight, compute_strip_offsets(WIDTH, n_strips)
+    return c, pair.interface.x, weight, compute_strip_offsets(n_strips)
 
 
 def rigid_strips(n_strips):
     """Return (normal, x, weight, offsets) of strips of rigid bodies, with a single node in the middle."""
     weight = np.full(1, LENGTH * WIDTH / n_strips)
-    return np.zeros((1, 1)), np.zeros(1), weight, compute_strip_offsets(WIDTH, n_strips)
+    return np.zeros((1, 1)), np.zeros(1), weight, compute_strip_offsets(n_strips)
 
 
 def random_gaps(rng, x, n_strips, amplitude):

@@ -49,7 +49,7 @@ def write_small_series(folder, frames: int = 3, times=None, order=None):
         "status": rng.integers(3, size=(frames, 4)),
         "holder_slide": np.repeat(rng.normal(size=(frames, 1)) * 1e-5, 4, axis=1),
         "normal_bond_lower": rng.normal(size=(frames, 4)) * 1e6,
-        "worn_depth": rng.random((frames, 2, 4)) * 1e-7,  # of two strips
+        "worn_depth": rng.random((frames, 4)) * 1e-7,
     }
     pieces = Pieces(times, lower, upper, X, np.ones(4), interface, width=5e-3)
     blocks = make_blocks(pieces)

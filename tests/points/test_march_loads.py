@@ -26,7 +26,7 @@ from varying_load_cases import (
 )
 
 from patchfem.core import InitialState, SineDrive
-from patchfem.model.structure import compute_strip_slides
+from patchfem.model.structure import compute_band_slides
 from patchfem.slip.shear_modes import find_sufficient_modes, shear_modes
 
 # these laws share one compiled loop; Coulomb friction and the tanh law need others
@@ -149,7 +149,7 @@ def test_exact_strip_slides_under_yaw():
     basis = make_modes([100.0], [1.0], [0.0], [0.0])
     yawing = replace(basis, normal=None, pitch=None, yaw=np.array([2.0]))
     offsets = np.array([-1e-3, 0.0, 1e-3])
-    rows = compute_strip_slides(yawing, offsets)
+    rows = compute_band_slides(yawing, offsets)
     assert rows[:, 0] == pytest.approx([1.002, 1.0, 0.998])
     # the friction -f acts on the body at y: M_z = -sum(y (-f)) = sum y f
     friction = np.array([1.0, 2.0, 5.0])

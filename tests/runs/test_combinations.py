@@ -45,7 +45,7 @@ TAIL = RIG[RIG.index("[drive]") :]
 LOAD = "normal.amplitude=20 N; normal.frequency=50 Hz"
 CUBIC = "structure.stiffening.cubic=1e10 N/m^3"
 INTERLOCK = "structure.bonded.stiffness=1e5 N/m; structure.bonded.wavelength=80 um"
-SHEAR, LOWER, STRIPS = "contact.shear={}", "contact.crown.on=lower", "contact.strips.count=3"
+SHEAR, LOWER, AREA = "contact.shear={}", "contact.crown.on=lower", "contact.area.cells=32"
 SKIN = "contact.asperities.law=exponential; contact.asperities.decay_length=1 um"
 WAVEFORMS = (
     "drive.waveform=step",
@@ -54,10 +54,10 @@ WAVEFORMS = (
 )
 METHODS = ["", *(f"accuracy.method={name}" for name in ("exact", "march", "harmonic"))]
 SUMS = ["", *(f"accuracy.quadrature={name}" for name in ("recursion", "direct", "merged"))]
-PITCH, YAW = "structure.mode.axial.pitch=1 rad/m", "structure.mode.axial.yaw=2 rad/m; " + STRIPS
+PITCH, YAW = "structure.mode.axial.pitch=1 rad/m", "structure.mode.axial.yaw=2 rad/m; " + AREA
 RUNS = {  # Kind of run: text, table of the law, effects and engines.
     "bench of a point": (POINT + BENCH, "friction", ("", LOAD), SUMS),
-    "bench of a patch": (PATCH + BENCH, "friction", ("", SHEAR, LOWER, STRIPS, SKIN), SUMS),
+    "bench of a patch": (PATCH + BENCH, "friction", ("", SHEAR, LOWER, AREA, SKIN), SUMS),
     "rig of a point": (
         POINT + RIG,
         "friction",

@@ -1,4 +1,4 @@
-"""Effects in static patches: skins, strips, profiles, unlike pieces, rounded pieces and the
+"""Effects in static patches: skins, profiles, unlike pieces, rounded pieces and the
 automatic mesh."""
 
 import re
@@ -7,8 +7,7 @@ import contact_forms as exact
 import numpy as np
 import pytest
 from command_line import read_json, run_successfully
-from scene_runs import find_sentences, run_scene
-from scene_texts import COATED, PIECE
+from scene_texts import PIECE
 
 import patchfem as pf
 from patchfem import build
@@ -88,11 +87,10 @@ def test_exact_rigid_wedges_on_skins_agree_with_closed_forms(angle):
 
 @pytest.mark.share(0, 5)
 @pytest.mark.parametrize("law", SKINS)
-@pytest.mark.parametrize("strips", ["", '[contact.strips]\ncount = 3\nroll = "0.01 mrad"\n'])
-def test_exact_normal_stiffness_is_derivative_of_load(law, strips):
+def test_exact_normal_stiffness_is_derivative_of_load(law):
     """The normal stiffness agrees with a finite difference of the load over the approach. Behind a
     linear skin this slope jumps between nodes, so that the difference spans about a dozen nodes."""
-    tables = TILT.format(2e-5) + SKINS[law] + strips
+    tables = TILT.format(2e-5) + SKINS[law]
     _, patch_values = solve_patch(tables)
     step = 3e-9 if law == "linear" else 1e-13
     loads_around = []
@@ -126,52 +124,6 @@ def test_exact_sticking_loop_has_stiffness_of_skin(law):
         result = run(load_scene(SKINS[law] + tables + bench), estimate=False)
         assert result.response.force.max() == pytest.approx(stiffness * 1e-9, rel=2e-4)
         assert result.measures["loop_area"].value <= 1e-9 * stiffness * 1e-18
-
-
-# ---- strips
-def test_exact_rolled_rigid_strips_agree_with_closed_form():
-    """At half the roll angle that opens the contact, the pressure is linear over the width, with its centre at half the
-    sixth of the width that bounds full contact; that of strips is it times 1 - 1/count^2."""
-    roll = 0.5 * exact.wedge_opening_tilt(LOAD, WIDTH, LENGTH, 1e13)
-    tables = SKINS["linear"] + f'[contact.strips]\ncount = 2\nroll = "{roll!r} rad"\n'
-    patch, patch_values = solve_patch(tables, material=RIGID)
-    centre = exact.wedge_on_linear_foundation(roll, LOAD, WIDTH, LENGTH, 1e13)[1]
-    assert centre == pytest.approx(-WIDTH / 12, rel=1e-12)
-    assert patch_values["pressure_centre_lateral"] == pytest.approx(centre * (1 - 1 / 4), rel=1e-5)
-    assert patch_values["roll_moment"] == pytest.approx(
-        LOAD * patch_values["pressure_centre_lateral"], rel=1e-12
-    )
-    assert patch_values["contact_fraction"] == pytest.approx(1.0, rel=1e-12)
-    weight = patch.pieces.interface.weight
-    assert weight @ patch.pressure.sigma_n == pytest.approx(LOAD, rel=1e-10)
-
-
-@pytest.mark.parametrize(
-    "key, prescribed",
-    [
-        ('roll = "0.02 mrad"', {"normal_load", "rotation", "roll"}),
-        (
-            'offset = "1 mm"',
-            {"normal_load", "rotation", "roll_moment", "pressure_centre_lateral"},
-        ),
-        ('roll = "0 rad"', None),
-    ],
-)
-def test_strips_of_different_pressures_state_no_errors(key, prescribed):
-    """Without the coupling between strips only prescribed measures have errors; a warning says how large the effect is.
-    Level strips state all errors."""
-    result = run_scene(
-        COATED + f"[contact.strips]\ncount = 4\n{key}\n[accuracy]\ntolerance = 0.01\n"
-    )
-    known = {name for name, measure in result.measures.items() if measure.error is not None}
-    warnings = find_sentences(result.warnings, "strips neglect the elastic coupling")
-    if prescribed is None:
-        assert known == set(result.measures) and not warnings
-        return
-    assert known == prescribed
-    assert "coupling" in result.measures["tangential_stiffness"].reason
-    assert len(warnings) == 1 and "38 % too large" in warnings[0]
-    assert "33 % too small" in warnings[0]
 
 
 # ---- profiles

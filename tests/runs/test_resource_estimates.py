@@ -44,11 +44,6 @@ MARCH, GIGABYTE = "accuracy.method=march", 10**9
             ],
             "lower accuracy.steps_per_cycle",
         ),
-        (
-            PATCH,
-            ["contact.strips.count=10000", "contact.element_size=50 um"],
-            "lower contact.strips.count",
-        ),
     ],
 )
 def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypatch):

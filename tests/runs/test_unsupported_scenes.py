@@ -26,7 +26,8 @@ from patchfem.core import Missing, PatchfemError
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 COULOMB_RIG = POINT + COULOMB + STRUCTURE
 BONDED_RIG = POINT + NONLOCAL + STRUCTURE
-STRIPS_RIG = COATED + "[contact.strips]\ncount = 4\n" + COULOMB + STRUCTURE
+FACE_PATCH = COATED.replace('element_size = "0.5 mm"\n', "") + "[contact.area]\ncells = 64\n"
+FACE_RIG = FACE_PATCH + COULOMB + STRUCTURE
 RANDOM_RIG = (
     MODE + '[drive]\nkind = "base"\nwaveform = "random"\nspectrum = "0.01 g^2/Hz"\n'
     'from = "20 Hz"\nto = "300 Hz"\nduration = "3 s"\n'
@@ -188,7 +189,7 @@ REFUSALS = [
         CONTACT_GROOVES + "contact.holder.tangential_stiffness=1e7 N/m",
         r"contact\.holder\.tangential_stiffness: not supported yet with \[contact\.grooves\] and law 'coulomb'",
     ),
-    # ---- holders, strips and normal motion
+    # ---- holders, faces and normal motion
     (
         RIG,
         "contact.holder.tangential_stiffness=5e6 N/m; friction.reading=report; friction.order=-0.5",
@@ -202,22 +203,22 @@ REFUSALS = [
     (
         COATED + COULOMB + STRUCTURE,
         "structure.mode.axial.yaw=30 rad/m",
-        "axial.yaw: .*contact.strips",
+        "axial.yaw: .*contact.area",
     ),
     (
-        STRIPS_RIG,
+        FACE_RIG,
         BONDS + "friction.order=2; structure.mode.axial.yaw=30 rad/m",
-        r"structure\.mode\.axial\.yaw: not supported yet with contact\.strips and law 'nonlocal' of order 2",
+        r"structure\.mode\.axial\.yaw: not supported yet with contact\.area and law 'nonlocal' of order 2",
     ),
     (
-        STRIPS_RIG,
+        FACE_RIG,
+        BONDS + "contact.shear={}; structure.mode.axial.yaw=30 rad/m",
+        r"axial\.yaw: not supported yet with \[contact\.shear\]; leave one of the two out",
+    ),
+    (
+        FACE_RIG,
         "contact.shear={}; friction.kinetic=0.2",
         r"friction\.kinetic: 0\.2 below static = 0\.3 with \[contact\.shear\]",
-    ),
-    (
-        STRIPS_RIG,
-        "contact.shear={}; contact.holder.tangential_stiffness=5e6 N/m",
-        r"contact\.strips: not supported yet with \[contact\.shear\]; leave one of the two out",
     ),
     # ---- instruments and drives
     (
@@ -308,7 +309,11 @@ REFUSALS = [
         r"missing \[friction\]: a run with a load, a slide or wear also needs this table",
     ),
     (COULOMB_RIG, FREE + WEAR, r"wear: .* last cycle of a steady motion"),
-    (STRIPS_RIG, "contact.shear={}; " + WEAR, r"contact.strips and \[contact.shear\]"),
+    (
+        FACE_RIG,
+        "contact.shear={}; structure.mode.axial.yaw=30 rad/m; " + WEAR,
+        r"wear: .*yaw and \[contact.shear\]",
+    ),
     (
         BENCH,
         WEAR + '; wear.friction.depth=["0 um", "8 um"]; wear.friction.coefficient_factor=[1, 0.2]',

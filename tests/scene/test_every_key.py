@@ -35,9 +35,10 @@ COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\nkinetic = 0.2\n'
 SCENES = {
     "patch": COATED.replace("0.5 mm", "2 mm") + '[contact.tilt]\nangle = "0.02 mrad"\n'
     '[contact.crown]\nradius = "20 m"\n',
-    "rough patch": FLAT
-    + '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n[contact.strips]\n'
-    'count = 2\n[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n',
+    "rough patch": FLAT + '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n'
+    '[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n',
+    "face": FLAT.replace('element_size = "2 mm"\n', "")
+    + '[contact.area]\ncells = 32\n[contact.crown]\nradius = "50 m"\n',
     "worn bench": FLAT + COULOMB + BRIEF + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1e5\n',
     "grown bench": POINT
     + GROWING

@@ -57,12 +57,16 @@ def test_refuses_combination_without_meaning(text, sets, key, says):
 
 def test_refuses_unsupported_keys_at_their_lines():
     """Unsupported keys in a file are refused at their lines."""
-    patch = '[contact.strips]\ncount = 4\n[contact.shear]\n[contact.holder]\ntangential_stiffness = "1e7 N/m"\n'
-    text = RIG.replace("[friction]", f"{patch}[friction]")
+    text = RIG.replace(
+        "[friction]", "[contact.grooves]\n[contact.area]\n[contact.shear]\n[friction]"
+    )
+    text = text.replace(
+        "[contact.grooves]", '[contact.grooves]\nwavelength = "80 um"\namplitude = "0 um"'
+    )
     text += '[accuracy]\nmethod = "exact"\n'
     assert list_mistakes(text) == [
-        f"a.toml:{find_line(text, '[contact.strips]')}: contact.strips: not supported yet with [contact.shear]; leave "
-        "one of the two out",
+        f"a.toml:{find_line(text, '[contact.grooves]')}: contact.grooves: cannot be used beside [contact.area], whose faces "
+        "are flat along the slide: leave one of the two out",
         f"a.toml:{find_line(text, 'method')}: accuracy.method: the motion cannot be computed from event to event for "
         "law 'nonlocal' with [contact.shear]; use 'march' or leave `method` out",
     ]

@@ -80,7 +80,7 @@ BAD_SETS = [
     ("contact.lower.end_radius=6.4 mm", "contact.lower.end_radius", "leaves no flat face"),
     ("contact.load_line.offset=1 mm", "contact.load_line", "unless [contact.holder]"),
     ("contact.load=1e40 N", "contact.load", "a mean pressure above Young's modulus"),
-    ('contact.strips={count = 2, roll = "-9 deg"}', "contact.strips.roll", "must be >= -0.1 rad, not '-9 deg'"),
+    ("contact.tilt.roll=1 mrad", "contact.tilt.roll", "add [contact.area]"),
     ("contact.crown.radius=-1 m", "contact.crown.radius", "for a hollow surface leave out [contact.crown]"),
     ("structure.mode.axal.frequency=1 Hz", "structure.mode.axal", "did you mean 'axial'?"),
     ("structure.mode.second.base=0.7", "structure.mode.axial.slide", "sum of `base`^2"),
@@ -135,7 +135,7 @@ OFFSET = "contact.load_line.offset"
 MOMENT = "contact.load_line.moment"
 ORDER = "friction.reading=report; friction.order"
 LOAD_LINE = PATCH.replace('[contact.tilt]\nangle = "0.1 mrad"\n', "[contact.load_line]\n")
-FREE_ROLL = PATCH + '[contact.strips]\ncount = 4\noffset = "1 mm"\n'
+FREE_ROLL = PATCH + '[contact.area]\n[contact.load_line]\nacross = "1 mm"\n'
 APPROACH = FREE_ROLL.replace('load = "26 lbf"', "") + '[contact.approach]\ndistance = "1 um"\n'
 LIMITS = [  # text, settings, and what the message says; no message if the scene is valid
     (RIG, f"contact.shear={{}}; {ORDER}=-0.5", "whose bonds at rest no force can move"),
@@ -150,10 +150,11 @@ LIMITS = [  # text, settings, and what the message says; no message if the scene
     (LOAD_LINE, f"{OFFSET}=6.34 mm", ""),
     (LOAD_LINE, f"{OFFSET}=1 mm; contact.load=0 N", ""),
     (FREE_ROLL, "", ""),
-    (FREE_ROLL, "contact.strips.roll=1 mrad", "keep only one of these two keys"),
-    (FREE_ROLL, "contact.strips.count=1", "raise contact.strips.count"),
-    (FREE_ROLL, "contact.strips.offset=-4.7625 mm", "|offset| < 0.0047625 m"),
-    (APPROACH, "", "use contact.load in place of [contact.approach]"),
+    (FREE_ROLL, "contact.tilt.roll=1 mrad", "keep only one of these two keys"),
+    (FREE_ROLL, "contact.load_line.across=-6.35 mm", "|across| < width/2 = 0.00635 m"),
+    (FREE_ROLL, "contact.area.hardness=0.5 MPa", "not above the mean pressure"),
+    (FREE_ROLL, "contact.shear={}; contact.upper.height=5 mm", "pieces of different elasticity"),
+    (APPROACH, "", "an approach of a piece that can rotate was removed"),
     (RIG, "structure.mode.axial.base=1e40", "sum of `base`^2"),
     (RIG, "structure.mode.axial.base=1e200", "outside the computable range"),
     (RIG, "structure.mode.axial.frequency=1e300 Hz", "outside the computable range"),

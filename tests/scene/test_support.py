@@ -60,7 +60,8 @@ SETS = {
     "patch.approach": "{patch}.approach.distance=1_um",
     "patch.grooves": "{patch}.grooves.wavelength=80_um {patch}.grooves.amplitude=1_um",
     "patch.holder.tangential_stiffness": "{patch}.holder.tangential_stiffness=1e7_N/m",
-    "patch.strips": "{patch}.strips.count=4",
+    "patch.area": "{patch}.area.cells=64",
+    "patches of interfaces": OWN_PATCH,
     "sensor apart from the output": "structure.mode.second.gauge=0.3",
     "shape on the lower piece": (
         "{patch}.tilt.angle=0.1_mrad {patch}.tilt.on=lower"
@@ -85,11 +86,11 @@ PROPERTY = re.compile(r"\\\{.*?\}")
 # More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
 MORE_SETS = {
     "law for rigid pieces, partial slip, grooves": "{law}.law=tanh {law}.reference_speed=1_mm/s",
-    "grooves, patch.strips, partial slip": "{law}.law=coulomb",
-    "patch.strips, strips that slip together, partial slip": "{patch}.holder.tangential_stiffness=1e7_N/m",
-    "wear, patch.strips, partial slip": "{law}.law=coulomb",
+    "structure.measured=stuck, mode with yaw": "{patch}.area.cells=64",
+    "mode with yaw, bands that slip together, partial slip": f"{BONDS} {{patch}}.area.cells=64",
+    "wear, mode with yaw, partial slip": "{law}.law=coulomb {patch}.area.cells=64",
     "shape on the lower piece, interface": BONDS,
-    "mode with yaw, patch.strips, rig, law for one interface": f"{BONDS} {{law}}.order=2",
+    "mode with yaw, patch.area, rig, law for one interface": f"{BONDS} {{law}}.order=2",
 }
 REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
     '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\nboundary = [1, 2]\nslide = [1, 0]\n'
@@ -193,9 +194,8 @@ def test_refuses_each_cause_of_a_feature(text, changes, words):
 
 # Two rows that apply to a scene at the same key: (features of both, the key, end of the only message at it).
 OVERLAPS = [
-    ("patch.strips, law of an averaged pressure, partial slip", "contact.strips", "leave out this entry"),
+    ("patch.area, law of an averaged pressure, partial slip", "contact.area", "leave out this entry"),
     ("normal.amplitude, bench, law for flat faces, normal.grooves", "normal.amplitude", "leave one of the two out"),
-    ("wear, patch.strips, shape on the lower piece, wear.start", "wear", "leave out [wear] or leave out wear.start"),
 ]  # fmt: skip
 
 

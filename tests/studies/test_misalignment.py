@@ -188,3 +188,37 @@ def test_always_table_of_the_moving_rig_has_stated_values(moving, maps):
     assert 1e6 * slipping["relative_displacement_amplitude"].values[at] == pytest.approx(
         [12.91, 12.38], rel=2e-3
     )
+
+
+# ---- both tilts
+
+
+both = make_study_fixture("misalignment/both_tilts.py")
+
+
+def test_always_roll_costs_more_stiffness_and_work_than_tilt(both):
+    """Tilt and roll take the same contact; stiffness and work of a cycle are those stated."""
+    cases = [
+        both.run_case(*angles, cells=64) for angles in ((0, 0), (0.1, 0), (0, 0.1), (0.1, 0.1))
+    ]
+    flat, tilt, roll, _ = cases
+    assert tilt["contact"] == pytest.approx(roll["contact"], rel=1e-9)
+    assert 100 * np.array([case["contact"] for case in cases[1:]]) == pytest.approx(
+        [23, 23, 15], abs=1
+    )
+    stiffness = 1e-6 * np.array([case["stiffness"] for case in cases])
+    assert stiffness == pytest.approx([398, 226, 187, 171], rel=0.02)
+    lost = [100 * (1 - case["work"] / flat["work"]) for case in cases[1:]]
+    assert lost == pytest.approx([11, 16, 23], abs=1)
+    assert "11, 16 and 23 %" in both.__doc__
+
+
+rolled = make_study_fixture("misalignment/roll.py")
+
+
+def test_always_roll_moves_the_pressure_as_stated(rolled):
+    """Centre of pressure and yaw moment under a roll are those stated."""
+    centre = rolled.find_centre(1e-4, cells=64)
+    assert abs(centre.value + 5.28e-3) <= centre.error + 0.01e-3
+    moment = 1e3 * rolled.FRICTION * rolled.LOAD * abs(centre.value)
+    assert moment == pytest.approx(183, abs=1) and "183 N mm" in rolled.__doc__

@@ -216,11 +216,11 @@ def test_engaged_contact_gives_stated_peaks_and_coherence(tmp_path, capsys):
         key: value / peak[key[0], "one point on the axis", key[2]] for key, value in peak.items()
     }
     one = left["yaw", "a patch of 12.7 mm", 5.0]
-    two = left["yaw", "two patches 20 mm apart", 5.0]
+    two = left["yaw", "a patch of 35 mm", 5.0]
     assert_contains(
         engaged.ANSWER,
         f"{one:.2f} with a patch of 12.7 mm",
-        f"{two:.2f} with two patches 20 mm apart",
+        f"{two:.2f} with a patch of 35 mm",
     )
     assert_contains(
         engaged.__doc__,
@@ -236,7 +236,7 @@ def test_engaged_contact_gives_stated_peaks_and_coherence(tmp_path, capsys):
             / engaged.random_turn("yaw", "one point on the axis", 5.0, seed=seed).peak
             for seed in (2, 3)
         ]
-        for touch in ("a patch of 12.7 mm", "two patches 20 mm apart")
+        for touch in ("a patch of 12.7 mm", "a patch of 35 mm")
     ]
     assert_contains(
         engaged.__doc__,

@@ -165,6 +165,8 @@ def read_arrays(path: Path, name: str) -> dict:
     for key in [key for key in out if "DataOffsets/" in key]:
         block, _, field = key.replace("Offsets", "").partition("/Steps/")
         items = "Points" if field.startswith("PointData") else "Cells"
+        if f"{block}/NumberOf{items}" not in out:  # an image has a picture for each frame
+            continue
         size = int(out[f"{block}/NumberOf{items}"][0])
         rows = out[f"{block}/{field}"]
         first_rows = out.pop(key)

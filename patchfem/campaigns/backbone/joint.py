@@ -219,8 +219,8 @@ class JointMode(NamedTuple):
             reason = "on grooves"
         elif model.rig.friction.load_varies:
             reason = "with a load that changes with the motion"
-        elif model.rig.friction.strips_slide_apart:
-            reason = "for strips that slide independently of one another"
+        elif model.rig.friction.bands_slide_apart:
+            reason = "for bands that slide independently of one another"
         elif self.is_rigid and len(model.rig.friction.interfaces) > 1:
             reason = "for several interfaces with rigid friction"
         if reason:
@@ -385,7 +385,7 @@ def _stuck_stiffness(joint: JointMode) -> np.ndarray:
     """
     model = joint.model
     planned = joint.stiffness
-    load_changes = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
+    load_changes = model.rig.friction.load_varies or model.rig.friction.bands_slide_apart
     if joint.is_rigid or model.friction is None or model.grooves is not None or load_changes:
         return planned
     if not np.isfinite(planned).all() or not planned.all():

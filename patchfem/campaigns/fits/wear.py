@@ -19,7 +19,6 @@ from ...core import Measure, Missing, NotConverged, PatchfemError
 from ...inputs.damage import refuse_damage
 from ...model.model import Model
 from ...runs.patch import mesh_levels
-from ...runs.patch.press import nodal_areas
 from ...runs.run import run
 from ...runs.wear import evolve
 from ...scene.assignments import Range
@@ -231,7 +230,7 @@ def fit_wear(
         compute, target, bounds, MAX_DEPTH_ERROR_OVER_TOLERANCE * model.accuracy.tolerance
     )
     value = found.value
-    area = float(nodal_areas(model.patch, patch.pieces.interface).sum())
+    area = float(patch.pieces.interface.weight.sum())
     error = _estimate_depth_error(model, value, target, area, progress)
 
     # The depth depends almost only on the product of coefficient and cycles. So the curve of the depth gives the
@@ -365,7 +364,7 @@ def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, prog
     worn = evolve.compute_wear(model, patch, (None, None), progress)
     if worn.stopped:
         raise PatchfemError(f"fit {COEFFICIENT_KEY}: {worn.stopped}")
-    area = nodal_areas(model.patch, patch.pieces.interface).ravel()
+    area = patch.pieces.interface.weight.ravel()
     depths = np.array([moment.depth.ravel() for moment in worn.moments])
     depth = depths.max(axis=1) if name == MAX_WORN_DEPTH_NAME else depths @ area / area.sum()
     fraction = np.array([moment.cycle for moment in worn.moments]) / model.wear.cycles

@@ -63,7 +63,17 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
         return STYLE_FUNCTIONS[chart.style](answers, chart)
     if len(answers) > 1:
         chart = replace(chart, by="")
-    selected = {name: _select_span(answer.data, chart) for name, answer in answers.items()}
+    selected = {
+        name: _select_span(_reduce_faces(answer.data, chart), chart)
+        for name, answer in answers.items()
+    }
+    if chart.style == "face":
+        chart = replace(chart, style="map")
+    elif chart.style != "map" and any(
+        _is_over_face(answer.data.get(chart.y)) for answer in answers.values()
+    ):
+        caption = chart.caption.replace("the elements beside a node", "cells")
+        chart = replace(chart, title=f"{chart.title}, cut at y = 0", caption=caption)
     selected = {name: data for name, data in selected.items() if data}
     if not selected or (chart.style == "map" and len(selected) > 1):  # maps cannot share a chart
         return None
@@ -94,6 +104,38 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
     return Panel(chart.title, chart.style, *axes, curves, chart.caption, marks) if curves else None
 
 
+def _is_over_face(variable: Variable | None) -> bool:
+    """Return whether the last dimensions of a variable are y and x, as those of fields over a face; False for None."""
+    across = () if variable is None else variable.dims[-2:-1]
+    return bool(across) and across[0].partition("_")[0] == "y"
+
+
+def _reduce_faces(data: Variables, chart: Chart) -> Variables:
+    """Return the variables with fields over a face as a chart shows them.
+
+    They are the last frame for style "face", which shows no other fields, and the cut at y = 0 for lines. Maps over x and
+    frames leave them out.
+    """
+    shown = {}
+    for name, variable in data.items():
+        values = variable.values
+        if not _is_over_face(variable):
+            if chart.style != "face" or name != chart.y:
+                shown[name] = variable
+        elif chart.style == "face":
+            last = values.reshape(-1, *values.shape[-2:])[-1]
+            shown[name] = replace(variable, dims=variable.dims[-2:], values=last)
+        elif chart.style != "map":
+            # An even number of rows has no row in the middle.
+            last = values.shape[-2] // 2
+            rows = values[..., [(values.shape[-2] - 1) // 2, last], :]
+            dims = (*variable.dims[:-2], variable.dims[-1])
+            shown[name] = replace(variable, dims=dims, values=rows.mean(axis=-2))
+        elif values.ndim == 2:
+            shown[name] = variable
+    return shown
+
+
 def _split_names(names: str) -> list[tuple[str, str]]:
     """Return (variable, horizontal variable) for each name in a text such as "NAME NAME@X"; "" without @X."""
     return [(name, x) for name, _, x in (word.partition("@") for word in names.split())]
@@ -105,9 +147,8 @@ def _find_x(data: Variables, chart: Chart) -> str:
 
 
 def _as_floats(variable: Variable) -> np.ndarray:
-    """Return the values of a variable as floats, averaged over its dimension `strip` if it has one."""
-    values = np.asarray(variable.values, float)
-    return values.mean(axis=variable.dims.index("strip")) if "strip" in variable.dims else values
+    """Return the values of a variable as floats."""
+    return np.asarray(variable.values, float)
 
 
 def _make_axes(selected: list[Variables], chart: Chart) -> tuple[Axis, Axis]:
@@ -286,9 +327,10 @@ def _make_map(data: Variables, chart: Chart, x_axis: Axis, colours: Axis) -> Pan
     # the rows are a coordinate y in the units of x, the time, or frames
     y_axis = Axis("frame")
     rows = np.arange(len(values))
-    if variable.dims[0] == "y" and "y" in data:
-        y_axis = replace(x_axis, label=x_axis.label.replace("x [", "y ["))
-        rows = data["y"].values * y_axis.scale
+    if _is_over_face(variable) and variable.dims[0] in data:
+        label = x_axis.label.replace("x", "y", 1)
+        y_axis = replace(x_axis, label=label)
+        rows = data[variable.dims[0]].values * y_axis.scale
     elif "frame_time" in data and len(values) > 1:
         times = data["frame_time"].values - data["frame_time"].values[0]
         y_axis = make_axis("time in the last cycle", "s", times)

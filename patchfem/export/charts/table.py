@@ -23,9 +23,10 @@ class Chart:
     y : str
         Variables of the vertical axis. "NAME@X" is drawn against its own variable X.
     style : str
-        "line", "points", "area", "map" (colours over x and the first dimension), "overlay" (a line for each element of the
-        first dimension) or "film" (a map with a slider). Of a sweep: "relative" (measures divided by their first value),
-        "menu" (one measure at a time) or "maps" (the same over two keys).
+        "line", "points", "area", "map" (colours over x and the first dimension), "face" (a map of the last frame over x and
+        y), "overlay" (a line for each element of the first dimension) or "film" (a map with a slider). Of a sweep:
+        "relative" (measures divided by their first value), "menu" (one measure at a time) or "maps" (the same over two
+        keys).
     span : str
         "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str
@@ -244,6 +245,21 @@ RUN_CHARTS = (
         caption="Readings at the drive frequency, and what the sensors would indicate in the computed motion.",
     ),
     Chart(
+        "Worn depth over the face",
+        "x",
+        "wear_worn_depth",
+        "face",
+        y_label="worn depth",
+        caption="Worn depth of both pieces together after all cycles.",
+    ),
+    Chart(
+        "Pressure over the face",
+        "x",
+        "normal_stress",
+        "face",
+        caption="Normal stress of the cells at the end of the run, compression positive.",
+    ),
+    Chart(
         "Pressure on the interface",
         "x",
         "normal_stress",
@@ -268,6 +284,27 @@ RUN_CHARTS = (
         span="contact",
         caption="State of each node in the frames of the last cycle. A node slips in a frame where its own shear stress is "
         "at the friction limit; stick_fraction is that of the contact as a whole (mean slip weighted by the pressure).",
+    ),
+    Chart(
+        "Open, stick and slip over the face",
+        "x",
+        "reversal_status",
+        "face",
+        caption="State of the cells at the last reversal of the slide.",
+    ),
+    Chart(
+        "Slip per cycle over the face",
+        "x",
+        "slip_per_cycle",
+        "face",
+        caption="Path of the slip of each cell in a cycle.",
+    ),
+    Chart(
+        "Gap over the face",
+        "x",
+        "gap",
+        "face",
+        caption="Gap between the loaded surfaces at the end of the run.",
     ),
     Chart("Gap", "x", "gap", caption="Gap between the loaded surfaces at the end of the run."),
     Chart(
@@ -554,7 +591,7 @@ COMPARE_CHARTS = (
         "pressure_before@x_pressed_before pressure_after@x_pressed_after",
         x_label="x of the patch",
         y_label="normal stress",
-        caption="Normal stress of the pressed patch with each of the two surfaces; the mean over strips.",
+        caption="Normal stress of the pressed patch with each of the two surfaces; of a face at y = 0.",
     ),
     Chart(
         "Friction loops",

@@ -70,13 +70,11 @@ class Block(NamedTuple):
 def make_blocks(pieces: Pieces) -> dict[str, Block]:
     """Return both pieces and their interface as blocks.
 
-    The interface moves with the lower piece. A field of strips has its mean over the width there.
+    The interface moves with the lower piece.
     """
     x = pieces.x
     fields = {"weight": pieces.weight[None]}
-    for name, values in pieces.interface.items():
-        has_strips = values.ndim == 3 and not VTK_FIELDS[name].shape
-        fields[name] = values.mean(axis=1) if has_strips else values
+    fields |= pieces.interface
     segments = np.stack([np.arange(x.size - 1), np.arange(1, x.size)], axis=1)
     return {
         "lower": _piece_block(pieces.lower),

@@ -11,6 +11,7 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import explain_mkdir_error, write_rows, write_text
 from ...runs.pieces import compute_pieces
+from . import image
 from .blocks import STORED_PARTS, VTK_FIELDS, Block, make_blocks
 from .vtkhdf import Frames, write_blocks
 
@@ -65,8 +66,27 @@ def _label_units(grid) -> None:
             information.Set(vtkDataArray.UNITS_LABEL(), VTK_FIELDS[name].unit)
 
 
+def make_image_grid(frames: image.FaceFrames, number: int):
+    """Return one frame of the fields over a face as a pyvista.ImageData, in SI units."""
+    import pyvista as pv
+
+    grid = pv.ImageData(
+        dimensions=(frames.x.size, frames.y.size, 1),
+        spacing=(frames.x[1] - frames.x[0], frames.y[1] - frames.y[0], 1.0),
+        origin=(frames.x[0], frames.y[0], 0.0),
+    )
+    for name, values in frames.fields.items():
+        grid.cell_data[name] = values[number].ravel()
+    grid.field_data["TimeValue"] = [frames.times[number]]
+    grid.set_active_scalars("normal_stress")
+    return grid
+
+
 def make_result_grids(result: Result, numbers: Iterable[int]) -> list[MultiBlock]:
-    """Return frames of a run with a patch as pyvista.MultiBlock objects, in SI."""
+    """Return frames of a run with a patch as pyvista.MultiBlock objects, or as pyvista.ImageData of a face, in SI."""
+    if result.patch.model.area is not None:
+        frames = image.collect_face_frames(result)
+        return [make_image_grid(frames, number) for number in numbers]
     pieces = compute_pieces(result)
     blocks = make_blocks(pieces)
     return [make_grids(blocks, number, float(pieces.time[number])) for number in numbers]

@@ -51,12 +51,12 @@ def read_patch(folder: Path) -> PatchRun:
             f"{folder}: result.nc contains no {' and no '.join(missing)}; run the scene again"
         )
 
-    # A field of a patch with strips has a row for each strip, or one row that is valid for all of them.
+    # A field over a face has a row for each y.
     x = data["x"].values
-    y = data["strip_offset"].values if "strip_offset" in data else None
+    y = data["y"].values if "y" in data else None
     shape = x.shape if y is None else (y.size, x.size)
     depth = worn_depths(answer)[-1] if "wear" in scene else np.zeros(x.size)
-    weight = data["weight"].values if y is None else data["weight"].values / y.size
+    weight = data["weight"].values
     fields = (weight, data["unloaded_gap"].values, depth)
     try:
         area, gap, depth = (np.broadcast_to(field, shape) for field in fields)
@@ -74,7 +74,7 @@ def read_patch(folder: Path) -> PatchRun:
 
 
 def worn_depths(answer: Answer) -> np.ndarray:
-    """Return the worn depth [m] of both pieces after the cycles of `wear_frame`: (f, m), or (f, s, m) with strips."""
+    """Return the worn depth [m] of both pieces after the cycles of `wear_frame`: (f, m), or (f, ny, nx) over a face."""
     if "wear_worn_depth" not in answer.data:
         raise PatchfemError("result.nc contains no wear_worn_depth; run the scene again")
     return answer.data["wear_worn_depth"].values

@@ -131,7 +131,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
     Raises
     ------
     PatchfemError
-        If the folder is not that of a run from unworn pieces with [wear], without strips.
+        If the folder is not that of a run from unworn pieces with [wear] over a plane patch.
     """
     run = read_patch(folder)
     wear = run.tables.get("wear", {})
@@ -148,7 +148,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
             "start" in wear,
             "it starts from worn pieces (wear.start); give a run that starts from unworn pieces",
         ),
-        (run.state.y is not None, "a trace shows one line; give a run without [contact.strips]"),
+        (run.state.y is not None, "a trace shows one line; give a run without [contact.area]"),
         (
             not piece and upper_share != share,
             f"with wear.upper_share = {upper_share:g} the pieces wear differently; say with --piece upper or --piece "

@@ -7,7 +7,7 @@ from ..answer import Variable, Variables
 MAX_MAP_POINTS = 400  # largest number of rows and of columns of a stored map
 VARIABLE_TEXTS = {
     "x": "position along the surface; in the second trace of a comparison",
-    "y": "position across; middle of a strip",
+    "y": "position across",
     "before": "height before wear",
     "after": "height after wear, aligned",
     "depth": "worn depth: before less after",

@@ -185,10 +185,12 @@ def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Variables:
         ends = np.array([wear.track[name].value for name in ("from", "to")])
         data |= make_variables("track_end", track_end=ends)
 
-    # Pressure of the last frame, and the loop of a patch without strips.
+    # Pressure of the last frame, on a face that at y = 0, and the loop of a single interface.
     for side, run in zip(SURFACE_NAMES, runs, strict=True):
         variables, x = run.answer.data, f"x_pressed_{side}"
-        pressure = (variables["normal_stress"].values[-1], "Pa")
+        last = np.atleast_2d(variables["normal_stress"].values[-1])
+        middle = last[(len(last) - 1) // 2 : len(last) // 2 + 1].mean(axis=0)
+        pressure = (middle, "Pa")
         data |= make_variables(x, **{x: run.state.x, f"pressure_{side}": pressure})
         if "loop_slide" in variables and variables["loop_slide"].values.ndim == 1:
             force = (variables["loop_friction_force"].values, "N")

@@ -199,7 +199,7 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
             others = f" ({len(missed) - 1} other measure{'s' * (len(missed) > 2)} also above it in some cases)"
         counts[f"over the tolerance in {_name_in_words(name)}{others}"] = missed[name]["count"]
 
-    # Settled cases whose main measures have no error, as of strips
+    # Settled cases whose main measures have no error
     unknown = np.zeros(len(table), bool)
     for name in table.measures.keys() & set(MAIN_MEASURES):
         column = table.measures[name]

@@ -63,11 +63,12 @@ def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list[Model | 
 def _may_share_meshes(model: Model | PatchfemError) -> bool:
     """Return whether a model has a patch without a common mesh.
 
-    The patch of a bolted joint keeps its own mesh, so that a case is equal to a single run.
+    The patch of a bolted joint keeps its own mesh, so that a case is equal to a single run. Faces share their cells
+    without it.
     """
     if not isinstance(model, Model) or model.patch is None or model.has_bolted_patch:
         return False
-    return model.patch.mesh.shared is None
+    return model.patch.mesh.shared is None and model.patch.area is None
 
 
 def _mesh_key(model: Model) -> tuple[Hashable, float]:

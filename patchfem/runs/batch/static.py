@@ -33,14 +33,14 @@ OUTCOMES = {
 def can_solve(model: Model) -> bool:
     """Return whether similar models of `model` are solved together.
 
-    Single runs treat strips, measured profiles and mesh files, and state what they neglect between unlike pieces, at
+    Single runs treat faces, measured profiles and mesh files, and state what they neglect between unlike pieces, at
     rounded ends and for the asperities of a trace.
     """
     if model.kind != "patch" or has_unreadable_measurements(model):
         return False
     patch = model.patch
     return (
-        patch.interface.strips is None
+        patch.area is None
         and patch.gap.profile is None
         and patch.mesh.file is None
         and patch.pieces.are_alike

@@ -214,9 +214,10 @@ def uses_parallel_elements(model) -> bool:
 def nodal_element_limit(model, patch):
     """Return the tractions (m,) [Pa] at which the nodes of a pressed patch slip, if parallel elements compute the slip.
 
-    The result is None for other methods.
+    The result is None for other methods, and for the cells of a face, whose tractions are interpolated.
     """
-    return model.friction.static * patch.pressure.sigma_n if uses_parallel_elements(model) else None
+    is_exact = uses_parallel_elements(model) and model.patch.area is None
+    return model.friction.static * patch.pressure.sigma_n if is_exact else None
 
 
 class BenchSizes(NamedTuple):

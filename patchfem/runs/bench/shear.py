@@ -13,7 +13,7 @@ from ...contact.stiffness import tangential_stiffness
 from ...effects import law_has_trait
 from ...points import contacts, slides
 from ...slip import shear_modes
-from ..patch import store
+from ..patch import area_slip, store
 
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
 # pressure.
@@ -196,6 +196,12 @@ def _choose_modes(
         Steepest fall of the friction force of a node over its slip, relative to its friction limit [1/m].
     """
     compliance = patch.slip_compliance
+    if patch.model.area is not None:
+        bound = None if n_modes is not None else SHEAR_MODES_ERROR_RATIO * tolerance
+        count = n_modes or area_slip.N_AREA_MODES
+        modes = area_slip.choose_area_modes(patch, limit, length, count, bound)
+        shear_modes.require_stability(modes, steepest_fall)
+        return modes
     if n_modes is not None:
         return shear_modes.shear_modes(compliance, limit, n_modes, steepest_fall)
     return shear_modes.find_sufficient_modes(

@@ -116,7 +116,7 @@ def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
     Batch
     """
     solver = _CaseSolver(patch_model, make_cases(patch_model, count), tolerance)
-    if count == 1 or patch_model.interface.strips is not None:
+    if count == 1:
         for number in range(count):
             solver.solve_alone(number)
     elif patch_model.mesh.is_automatic:

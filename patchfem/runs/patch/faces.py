@@ -15,7 +15,7 @@ from ...slip import fields as slip_fields
 from ..results.interfaces import Face
 from ..results.result import SlipRule, collect_rest_frame, make_interface_frames
 from . import mesh_levels, store
-from .jenkins_elements import PatchElements, join_elements, list_elements
+from .jenkins_elements import PatchElements, make_elements
 from .press import Patches
 
 
@@ -78,7 +78,7 @@ def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> P
     """
     patch = solve_contact_on_meshes(interface, tolerance)[int(coarser)]
     length = record.make_law(interface.numbers, interface.load).length
-    return join_elements(list_elements(patch, interface.numbers.static, length))
+    return make_elements(patch, interface.numbers.static, length)
 
 
 def group_interfaces_with_coarse_mesh(model) -> list[tuple[int, ...]]:
@@ -118,6 +118,11 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
         if face.partial_slip and snapshots:
             jenkins_set = make_patch_elements(law, model.accuracy.tolerance).jenkins_set
 
+        # The tractions of the cells of a face are interpolated, so that they do not reach their limits exactly.
+        limit = None
+        if face.model.patch.area is None:
+            limit = law.numbers.static * face.patch.pressure.sigma_n
+
         # The stretches of the elements give the shear stress and the local slip of each node.
         if jenkins_set is not None:
             states = [snapshot.faces[face.number] for snapshot in snapshots]
@@ -129,7 +134,7 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
                 tau,
                 local,
                 np.array([slide for slide, _ in states]),
-                SlipRule(law.numbers.static * face.patch.pressure.sigma_n),
+                SlipRule(limit),
             )
         out.append(face._replace(fields=fields))
     return tuple(out)

@@ -456,7 +456,7 @@ def find_contact_extent(pressed: PressedCases, case: int) -> ContactExtent:
     edge_cells = np.flatnonzero((is_loaded[:, 1:] != is_loaded[:, :-1]).any(axis=0))
     edge_positions = (x[edge_cells] + x[edge_cells + 1]) / 2
     cells = np.diff(x)[edge_cells]
-    if pressed.level.model.interface.strips is None and pressed.active[case].any():
+    if pressed.active[case].any():
         edges = find_contact_edges(pressed).list_edges(case)
         if len(edges) == edge_cells.size:
             edge_positions = np.array([end.position for end in edges])

@@ -11,7 +11,7 @@ from ...core import NotConverged, Outcome, PatchfemError
 from ...mesh import pieces as piece_meshes
 from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
-from . import profile_points, store
+from . import area, profile_points, store
 from .condensed import CondensedPair, condense, condense_once
 from .grids import (
     COARSE_GRID_DENSITY,
@@ -60,6 +60,8 @@ def solve_with_coarser(
         has the static measures with the errors that follow from all of them (`Patch.measures`).
     """
     mesh = patch_model.mesh
+    if patch_model.area is not None:
+        return solved or area.solve_face_on_grids(patch_model, tolerance, with_errors=with_errors)
     if mesh.shared is None and mesh.is_automatic:
         return solve_on_refined_meshes(patch_model, tolerance, with_errors, solved)
     levels = (mesh.shared or make_given_meshes(patch_model))[: None if with_errors else 1]

@@ -12,7 +12,7 @@ from ...mesh import pieces as piece_meshes
 from ...model.model import Model
 from ...model.pieces import make_piece_meshes
 from ..results.patch_rows import Values
-from . import skin, store
+from . import area, skin, store
 from .grids import MIN_NESTED_MESHES, make_base_grids
 
 # Tolerance below which a contact that ends inside the interface or at a step needs another
@@ -54,6 +54,9 @@ def count_unknowns(model: Model) -> dict[str, int]:
     points = 0
     nodes = 0
     for patch in patches.values():
+        if patch.area is not None:
+            points += area.count_cells(patch)
+            continue
         bodies = _predict_finest_mesh(patch, model.accuracy.tolerance)
         finest = [body for body in bodies if body is not None]
         points += finest[0].x.size
@@ -162,9 +165,9 @@ def describe_tilt(dimensionless_groups: Values, patch_model) -> list[str]:
     """Return a list with a sentence on the tilt relative to the tilt at which the contact of flat pieces opens."""
     tilt = dimensionless_groups.get("tilt_over_first_opening")
     gap = patch_model.gap
-    if tilt is None:
+    if tilt is None or patch_model.area is not None:
         return []
-    if gap.profile is not None or patch_model.interface.strips is not None or len(gap.shapes) > 1:
+    if gap.profile is not None or len(gap.shapes) > 1:
         return [
             f"the tilt is {tilt:.3g} times the tilt at which an edge of flat pieces would start to open, but these "
             "pieces are not flat"

@@ -19,7 +19,6 @@ from ...contact.press import (
     StripModel,
     StripProperties,
     StripsState,
-    compute_strip_offsets,
     press_strips,
     split_into_strips,
 )
@@ -29,14 +28,11 @@ from ...contact.strip_compliance import StripCompliance
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...elasticity.lapack import use_one_blas_thread
 from ...exceptions import UnresolvedTrace
-from ...model.patch import PatchModel, PatchStrips
+from ...model.patch import PatchModel
 from ..results.patch_rows import Arrays, Measures, Values
 from .cases import Cases, make_cases, make_gap_shapes
 from .condensed import CondensedPair
 from .skin import make_skin_law
-
-# Largest difference of the loads of strips, relative to their mean, that counts as round-off
-EQUAL_STRIP_LOAD_TOL = 1e-9
 
 
 class Surface(NamedTuple):
@@ -46,7 +42,7 @@ class Surface(NamedTuple):
     - weight (n,): areas [m2].
     - sigma_n (n,): normal stress [Pa].
     - gap (n,): gap under load [m].
-    - unloaded_gap: gap without load (n,), or (s, n) of strips [m].
+    - unloaded_gap: gap without load (n,) [m].
     """
 
     x: np.ndarray
@@ -93,12 +89,6 @@ class Level:
         return self.pair.compliance.interface.x
 
     @property
-    def n_strips(self) -> int:
-        """Number of strips, 1 for a patch without strips."""
-        strips = self.model.interface.strips
-        return 1 if strips is None else strips.count
-
-    @property
     def has_layer(self) -> bool:
         """Whether an asperity layer lies between the pieces."""
         return self.model.interface.skin is not None
@@ -111,7 +101,7 @@ class Level:
     @cached_property
     def strip(self) -> StripProperties:
         """Compliance [m/N] and nodal areas [m2] of one strip of the pieces, without layer."""
-        return split_into_strips(self.pair.compliance, self.n_strips)
+        return split_into_strips(self.pair.compliance, 1)
 
     @cached_property
     def linear_layer(self) -> np.ndarray | None:
@@ -133,8 +123,7 @@ class Level:
                 tangential = tangential + np.diag(layer / ratio)
         closing = self.pair.closing
         if closing.any():
-            coupling = closing * self.n_strips
-            tangential = np.block([[normal, coupling], [coupling.T, tangential]])
+            tangential = np.block([[normal, closing], [closing.T, tangential]])
         return normal, tangential
 
     @cached_property
@@ -270,14 +259,14 @@ class Patch:
 
     - model: PatchModel.
     - pair: condensed pieces.
-    - pieces: Compliance including the asperity layer of a patch without strips, a nonlinear layer being linearised
+    - pieces: Compliance including the asperity layer of the patch, a nonlinear layer being linearised
       at the operating point.
-    - pressure: ContactState; for strips its mean over the width.
-    - state: StripsState; a patch without strips is a single one.
+    - pressure: ContactState.
+    - state: StripsState of a single strip.
     - slip_compliance (m, m): tangential compliance [m/N] of nodes that slip one by one: that of
       the asperity layer, that of the pieces if the scene has [contact.shear], and that of the
       holder spring, which is equal in all entries.
-    - unloaded_gap (m,): gap of the unloaded surfaces [m]; (s, m) for worn strips.
+    - unloaded_gap (m,): gap of the unloaded surfaces [m].
     - notes: notes on the gap and on the pressure.
     - seconds: CPU seconds by name.
     - averaging: length [m] over which a profile in contact is averaged; None without a profile.
@@ -310,12 +299,12 @@ class Patch:
 
     @property
     def normal_stress(self) -> np.ndarray:
-        """Pressure at the nodes (m,) [Pa], averaged over the strips."""
+        """Pressure at the nodes (m,) [Pa]."""
         return self.pressure.sigma_n
 
     @property
     def gap(self) -> np.ndarray:
-        """Gap under load at the nodes (m,) [m]; for strips their smallest gap."""
+        """Gap under load at the nodes (m,) [m]."""
         return self.pressure.gap
 
     @property
@@ -360,19 +349,6 @@ class Patch:
     def has_smooth_skin(self) -> bool:
         """Whether the pieces carry pressure at every separation, through a nonlinear asperity layer."""
         return self.has_skin and self.model.interface.skin.law != "linear"
-
-    @property
-    def strips(self) -> StripsState | None:
-        """Contact state of a patch that is divided into strips, else None."""
-        return None if self.model.interface.strips is None else self.state
-
-    @property
-    def has_unequal_strips(self) -> bool:
-        """Whether the pressure varies across the width, so that the neglected coupling of the strips has an effect."""
-        if self.strips is None:
-            return False
-        loads = self.strips.force.sum(axis=1)
-        return bool(np.ptp(loads) > EQUAL_STRIP_LOAD_TOL * loads.mean())
 
     @property
     def active(self) -> np.ndarray:
@@ -538,7 +514,7 @@ def _make_patch(patch_model, pressed: PressedCases, state: StripsState, gap) -> 
     interface = patch_model.interface
     skin = interface.skin
 
-    # The fields of a patch are means over its strips; the gap is the smallest one.
+    # The fields of a patch are those of its only strip.
     mean_state = ContactState(
         frozen_array(pressed.mean_pressure[0]),
         frozen_array(state.gap.min(axis=0)),
@@ -551,10 +527,10 @@ def _make_patch(patch_model, pressed: PressedCases, state: StripsState, gap) -> 
         state.residuals,
     )
 
-    # Without strips, the layer can be part of the compliance. Without a tangential ratio it is rigid in shear.
+    # The layer can be part of the compliance. Without a tangential ratio it is rigid in shear.
     pieces = pair.compliance
     layer_shear = 0.0
-    if skin is not None and interface.strips is None:
+    if skin is not None:
         layer = np.diag(pressed.layer[0, 0])
         if skin.tangential_ratio is not None:
             layer_shear = layer / skin.tangential_ratio
@@ -668,7 +644,7 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
                 level.model,
                 level.pair.compliance,
                 unloaded_gap[case],
-                holder=_make_holder(level.model, cases, case),
+                holder=_make_holder(cases, case),
             )
         except PatchfemError as error:
             errors[int(case)] = error
@@ -686,19 +662,11 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
     return PressedCases(level, force, gap, unloaded_gap, holder, layer), errors
 
 
-def nodal_areas(patch_model, interface) -> np.ndarray:
-    """Return the nodal areas (m,) [m2] of an interface; (s, m) for a patch in strips."""
-    if patch_model.interface.strips is None:
-        return interface.weight
-    count = patch_model.interface.strips.count
-    return np.repeat(interface.weight[None] / count, count, axis=0)
-
-
 def make_contact_force_function(patch_model, pair: CondensedPair):
     """Return a function that computes the contact forces between worn surfaces.
 
     It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added
-    to the diagonal of the compliance, to nodal forces (m,) [N]. For strips all arrays are (s, m).
+    to the diagonal of the compliance, to nodal forces (m,) [N].
 
     Raises
     ------
@@ -722,8 +690,7 @@ def press_pieces(
 ) -> StripsState:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
-    A patch without strips is a single strip. The strips do not interact: each one has the compliance of its
-    fraction of the width (`contact.press`).
+    The patch is the only strip of `contact.press`.
 
     Parameters
     ----------
@@ -744,9 +711,8 @@ def press_pieces(
     -------
     StripsState
     """
-    count, _, _ = patch_model.interface.strips or PatchStrips(1, 0.0, None)
-    strip = split_into_strips(pieces, count)
-    offsets = compute_strip_offsets(patch_model.pieces.width, count)
+    strip = split_into_strips(pieces, 1)
+    offsets = np.zeros(1)
 
     strips = StripModel(
         StripCompliance(strip.normal, added),
@@ -754,13 +720,12 @@ def press_pieces(
         None if patch_model.interface.skin is None else make_skin_law(patch_model),
     )
 
-    holder = holder or _make_holder(patch_model, make_cases(patch_model, 1), 0)
+    holder = holder or _make_holder(make_cases(patch_model, 1), 0)
     return press_strips(strips, gap, holder, start)
 
 
-def _make_holder(patch_model, cases: Cases, case: int) -> Holder:
-    """Return load and prescribed motions of one case; `patch_model` has the strips."""
-    _, roll, offset = patch_model.interface.strips or PatchStrips(1, 0.0, None)
+def _make_holder(cases: Cases, case: int) -> Holder:
+    """Return load and prescribed motions of one case."""
     numbers = np.array(cases.holders)[:, case].tolist()
     load, approach, moment, spring = (None if np.isnan(one) else one for one in numbers)
     # Under a prescribed approach, at which no piece rotates, the load follows from the solution.
@@ -768,10 +733,8 @@ def _make_holder(patch_model, cases: Cases, case: int) -> Holder:
         load=load,
         approach=approach,
         moment=moment,
-        roll_moment=None if offset is None else load * offset,
         spring=spring,
         rotation=float(cases.rotation[case]),
-        roll=roll,
     )
 
 

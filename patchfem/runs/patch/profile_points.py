@@ -91,7 +91,6 @@ def can_use_points(patch_model) -> bool:
         and patch_model.mesh.is_automatic
         and patch_model.mesh.edge_motion != "wear"
         and patch_model.interface.skin is None
-        and patch_model.interface.strips is None
         and not patch_model.pieces.has_overhang
     )
 
@@ -102,7 +101,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     Parameters
     ----------
     patch_model : PatchModel
-        Patch with a profile, without strips.
+        Patch with a profile.
     meets_tolerance : callable
         Function of a PointSolution that ends the refinement. MAX_PROFILE_POINTS and MAX_POINT_ITERATIONS end it as
         well.

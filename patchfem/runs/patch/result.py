@@ -5,17 +5,13 @@ a run without motion, warnings, and notes on plane state, lever arms, couplings 
 clamping.
 """
 
-from dataclasses import replace
-
 from ... import surface
-from ...contact.press import NEGLECTED_SHEAR_NOTE
 from ...core import Outcome
 from ...formatting import format_length, format_quantity
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
 from ...scene.keys.contact import Material
-from ..results.patch_rows import Measures, list_prescribed_measures
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
 from .measures import note_on_plane_state
@@ -29,14 +25,6 @@ MAX_SMALL_STRAIN = 0.02
 
 # Smallest ratio of normal to tangential displacement under a shear force that a note reports.
 MIN_REPORTED_NORMAL_COUPLING_RATIO = 0.02
-UNCOUPLED_STRIPS_REASON = "error unknown without the coupling of the strips"
-# The numbers are those of 64 strips against the solution in three dimensions.
-UNCOUPLED_STRIPS_WARNING = (
-    "the pressure varies across the width, but the strips neglect the elastic coupling between them: for a coated block of "
-    "titanium, 12.7 mm long and wide and 6.35 mm high, that is rolled by 0.1 mrad, contact_fraction is 38 % too large and "
-    "tangential_stiffness 33 % too small; the static measures therefore have no stated error, and the errors of other "
-    "measures do not contain this effect; where it matters, use a three-dimensional contact model"
-)
 
 
 def make_piece_meshes_of_run(model) -> "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]":
@@ -50,36 +38,6 @@ def make_piece_meshes_of_run(model) -> "tuple[piece_meshes.Mesh, piece_meshes.Me
         return solve_with_coarser(model.patch, model.accuracy.tolerance)[0].pair.meshes
 
 
-def static_measures(model, patch) -> Measures:
-    """Return the measures of a solved patch.
-
-    They are those of `Patch.measures`, but strips with different pressures have no errors.
-
-    Parameters
-    ----------
-    model : Model
-        Model of the run.
-    patch : Patch
-        With measures, as from `solve_with_coarser`.
-
-    Returns
-    -------
-    dict
-        Measure by name.
-    """
-    measures = dict(patch.measures)
-    if not patch.has_unequal_strips:
-        return measures
-
-    # Without the coupling of the strips, only what the scene prescribes has an error.
-    for name in measures.keys() - list_prescribed_measures(model.patch):
-        if measures[name].value is not None:
-            measures[name] = replace(
-                measures[name], error=None, parts=None, reason=UNCOUPLED_STRIPS_REASON
-            )
-    return measures
-
-
 def make_static_result(inputs: RunInputs) -> Result:
     """Return the Result of a static patch, which may be without contact."""
     patch = inputs.patch
@@ -90,7 +48,7 @@ def make_static_result(inputs: RunInputs) -> Result:
     return Result(
         plan=inputs.plan,
         outcome=pressure.outcome,
-        measures=static_measures(inputs.plan.model, patch),
+        measures=dict(patch.measures),
         seconds=inputs.seconds,
         warnings=warnings,
         notes=inputs.notes,
@@ -114,14 +72,11 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
     warnings = warn_of_strains(
         patch_model, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach
     )
-    if contact_reaches_steep_end(patch.pressed).any():
+    if patch_model.area is None and contact_reaches_steep_end(patch.pressed).any():
         warnings.append(
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
             "contact is computed; lower the tilt or the load"
         )
-
-    if patch.has_unequal_strips:
-        warnings.append(UNCOUPLED_STRIPS_WARNING)
 
     warnings += warn_of_locking(patch_model)
 
@@ -225,8 +180,10 @@ def notes_on_neglected_effects(face) -> list[str]:
         out += skin.note_on_asperity_stiffness(
             patch_model, float(patch.pressure.load / loaded_area)
         )
-    if patch.strips is not None:
-        out.append(NEGLECTED_SHEAR_NOTE)
+
+    # A face has no plane state, and its unequal pieces do not slip.
+    if patch_model.area is not None:
+        return out
 
     # Coupling of shear and normal motion, which acts only between dissimilar pieces.
     if patch.pair.coupling > MIN_REPORTED_NORMAL_COUPLING_RATIO:

@@ -26,7 +26,7 @@ def find_slip_zones(patch, slip, ends: list[ContactEdge]) -> tuple[Zone, ...]:
     ends : list of contact.edges.ContactEdge
         Contact edges inside the interface.
     """
-    if patch.strips is not None or not patch.active.any():
+    if not patch.active.any():
         return ()
 
     jenkins_set = elements(patch, slip.static, slip.bond_length)

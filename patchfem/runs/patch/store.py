@@ -43,12 +43,14 @@ def content_key(patch_model) -> Key:
     gap = patch_model.gap
     mesh = patch_model.mesh
     interface = patch_model.interface
-    if mesh.file is not None or gap.profile is not None:
+    has_scan = patch_model.area is not None and patch_model.area.scan is not None
+    if mesh.file is not None or gap.profile is not None or has_scan:
         return (patch_model,)
     return (
         patch_model.pieces,
         patch_model.loading,
-        (interface.strips, interface.has_shear, interface.partial_slip),
+        (interface.has_shear, interface.partial_slip),
+        patch_model.area,
         interface.skin and tuple(interface.skin),
         mesh,
         tuple((name, tuple(part)) for name, part in gap.shapes),

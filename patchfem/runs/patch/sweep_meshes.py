@@ -133,7 +133,6 @@ def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
     parameters = (
         astuple(patch_model.loading),
         patch_model.mesh.slip,
-        interface.strips,
         shapes,
         skin,
     )

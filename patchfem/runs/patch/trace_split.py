@@ -90,10 +90,9 @@ def split_trace(
     """
     loading = patch_model.loading
     gap = patch_model.gap
-    interface = patch_model.interface
-    if gap.profile is None or gap.is_rough or loading.load is None or interface.strips is not None:
+    if gap.profile is None or gap.is_rough or loading.load is None:
         raise PatchfemError(
-            "a split needs [contact.profile] and contact.load, without [contact.asperities] and [contact.strips]",
+            "a split needs [contact.profile] and contact.load, without [contact.asperities]",
             PROFILE_KEY,
         )
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from ... import closed_forms
 from ...contact import edges
-from ...contact.press import compute_strip_offsets
 from ...contact.set_table import solve_set
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grid import TensorGrid
@@ -206,9 +205,6 @@ def _compute_values(pressed: PressedCases) -> Arrays:
         estimate_peak_pressure(pressed.x, pressed.pressure, fraction).max(axis=1),
         _compute_edge_values(pressed),
     )
-    strips = level.model.interface.strips
-    if strips is not None:
-        values |= _compute_roll_values(pressed)
     return values
 
 
@@ -318,19 +314,6 @@ def _compute_stiffnesses(pressed: PressedCases, row_edges: edges.ContactEdges) -
     return work + edges.parabola_change(shift, *changes).sum(axis=-1)
 
 
-def _compute_roll_values(pressed: PressedCases) -> Arrays:
-    """Return the measures (n,) of a patch in strips about the x axis."""
-    strips = pressed.level.model.interface.strips
-    offsets = compute_strip_offsets(pressed.level.model.pieces.width, strips.count)
-    roll_moment = pressed.force.sum(axis=2) @ offsets
-    load = np.where(pressed.load > 0, pressed.load, 1.0)
-    return {
-        "pressure_centre_lateral": roll_moment / load,
-        "roll_moment": roll_moment,
-        "roll": pressed.holder.roll,
-    }
-
-
 def contact_intervals(patch: Patch, ends: list[edges.ContactEdge]) -> np.ndarray:
     """Return the contact intervals (k, 2) [m] of a patch in the order of increasing x.
 
@@ -340,8 +323,8 @@ def contact_intervals(patch: Patch, ends: list[edges.ContactEdge]) -> np.ndarray
 
 
 def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
-    """Return the contact edges between nodes as a list of `ContactEdge`; [] for a patch in strips."""
-    if patch.strips is not None or not patch.active.any():
+    """Return the contact edges between nodes as a list of `ContactEdge`."""
+    if not patch.active.any():
         return []
     return find_contact_edges(patch.pressed).list_edges(0)
 

@@ -24,7 +24,7 @@ PATCH_MEASURE_ROWS = (
         "contact_fraction",
         "1",
         0.0,
-        "fraction of the length of the interface that is in contact; the edges of "
+        "fraction of the length of the interface that is in contact, or of its area beside [contact.area]; the edges of "
         "contact may lie between nodes",
         group="patch",
         minimum=0.0,
@@ -117,11 +117,44 @@ PATCH_MEASURE_ROWS = (
         minimum=0.0,
     ),
     MeasureDefinition(
-        "pressure_centre_lateral",
+        "contact_area",
+        "m2",
+        0.0,
+        "area in contact, summed over all equal patches; needs [contact.area]",
+        group="patch",
+        minimum=0.0,
+    ),
+    MeasureDefinition(
+        "pressure_centre_y",
         "m",
         1e-12,
-        "position across the width of the resultant of the pressure; needs [contact.strips]",
+        "position across the width of the resultant of the pressure, relative to the middle; needs [contact.area]",
         group="patch",
+    ),
+    MeasureDefinition(
+        "roll_stiffness",
+        "N m rad-1",
+        0.0,
+        "derivative of the roll moment with respect to the roll at fixed approach; needs [contact.area]",
+        group="patch",
+        minimum=0.0,
+    ),
+    MeasureDefinition(
+        "yielded_fraction",
+        "1",
+        1e-4,
+        "fraction of the face whose pressure is the hardness; needs contact.area.hardness",
+        group="patch",
+        minimum=0.0,
+    ),
+    MeasureDefinition(
+        "stick_area_fraction",
+        "1",
+        1e-3,
+        "fraction of the area in contact that sticks at the last reversal of the slide; needs [contact.area] and partial "
+        "slip",
+        group="patch",
+        minimum=0.0,
     ),
     MeasureDefinition(
         "worn_volume", "m3", 0.0, "volume worn off both pieces together", group="wear", minimum=0.0
@@ -163,14 +196,14 @@ PATCH_MEASURE_ROWS = (
         "roll_moment",
         "N m",
         1e-10,
-        "moment of the pressure about x; needs strips that may rotate about x",
+        "moment of the pressure about x; positive if the pressure centre is on the side y > 0; needs [contact.area]",
         group="patch",
     ),
     MeasureDefinition(
         "roll",
         "rad",
         1e-12,
-        "rotation of the upper piece about x; needs [contact.strips]; a positive rotation "
+        "rotation of the upper piece about x; needs [contact.area]; a positive rotation "
         "opens the gap at +y",
         group="patch",
     ),
@@ -180,6 +213,7 @@ PATCH_MEASURE_ROWS = (
 FINEST_MESH_SOURCE = "finite elements, finest mesh"
 # This method is used if its estimated error is smaller than that of the finest mesh.
 EXTRAPOLATED_SOURCE = "finite elements, extrapolated over nested meshes"
+CELLS_SOURCE = "cells over the face"
 HALF_SPACE_SOURCE = "points on layered half-spaces"
 WORN_SOURCE = "wear in jumps of cycles"
 PATCH_TABLE = {row.name: row for row in PATCH_MEASURE_ROWS}
@@ -203,17 +237,6 @@ def make_measure(name: str, value: float, error: float | None, engine: str = "")
     row = PATCH_TABLE[name]
     error = None if error is None else float(error)
     return Measure(float(value), row.unit, error, row.floor, engine=engine)
-
-
-def list_prescribed_measures(patch_model) -> set[str]:
-    """Return the names of the static measures that a PatchModel with strips prescribes: load or approach, and rotations."""
-    loading = patch_model.loading
-    names = {"normal_load" if loading.approach is None else "approach"}
-    is_roll_free = patch_model.interface.strips.offset is not None
-    names |= {"roll_moment", "pressure_centre_lateral"} if is_roll_free else {"roll"}
-    if not loading.rotational_stiffness:
-        names |= {"moment", "pressure_centre"} if loading.can_rotate else {"rotation"}
-    return names
 
 
 def find_unknown_measures(measures: Measures) -> list[str]:

@@ -139,7 +139,7 @@ class RunInputs:
     def has_error_meshes(self) -> bool:
         """Whether each patch on whose mesh the motion depends is solved on a coarser mesh too."""
         rig = self.plan.model.rig
-        moves = rig is not None and (rig.friction.load_varies or rig.friction.strips_slide_apart)
+        moves = rig is not None and (rig.friction.load_varies or rig.friction.bands_slide_apart)
         return all(face.patches[1] is not None for face in self.faces if face.partial_slip or moves)
 
 
@@ -394,8 +394,8 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP_RULE) -> np.ndarray:
 def collect_used_settings(result) -> dict[str, str | float]:
     """Return the numerical settings that a run used, by name.
 
-    Besides those of `Settings`, they contain the resolution of its patches: the nodes of each interface, the strips of the
-    patch, and the length [m] over which its profile is averaged.
+    Besides those of `Settings`, they contain the resolution of its patches: the nodes of each interface, and the length [m]
+    over which its profile is averaged.
     """
     patch = result.patch
     used = result.settings._asdict()
@@ -408,9 +408,6 @@ def collect_used_settings(result) -> dict[str, str | float]:
         settings["interface_nodes"] = int(patch.x.size)
         if patch.averaging is not None:
             settings["profile_averaging"] = float(patch.averaging)
-        strips = result.plan.model.patch.interface.strips
-        if strips is not None:
-            settings["strips"] = int(strips.count)
     return settings
 
 

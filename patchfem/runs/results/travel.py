@@ -21,11 +21,13 @@ def find_max_displacement(slide) -> float:
 
 def measure_contact_length(patch) -> float:
     """Return the distance [m] between the outermost contact edges of a patch."""
-    loaded_nodes = np.flatnonzero(patch.active)
+    # The cells of a face share their positions along x.
+    x = np.unique(patch.x)
+    loaded_nodes = np.unique(np.searchsorted(x, patch.x[patch.active]))
     if not loaded_nodes.size:
         return 0.0
-    middle = (patch.x[1:] + patch.x[:-1]) / 2
-    ends = np.concatenate([patch.x[:1], middle, patch.x[-1:]])
+    middle = (x[1:] + x[:-1]) / 2
+    ends = np.concatenate([x[:1], middle, x[-1:]])
     return float(ends[loaded_nodes[-1] + 1] - ends[loaded_nodes[0]])
 
 

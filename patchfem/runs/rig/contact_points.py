@@ -1,7 +1,7 @@
 """Contact points of a rig for the march: a law, a load and a port for every effect.
 
-In: a Model, its Numerics and its Patch. Out: a `time_steps.contacts.Contact`. Each interface, or each strip of a patch that
-yaws or slips part by part, is a set of points on its port: a point, the nodes of a patch with shear modes of its pieces, or
+In: a Model, its Numerics and its Patch. Out: a `time_steps.contacts.Contact`. Each interface, or each band of a face that
+yaws, is a set of points on its port: a point, the nodes of a patch with shear modes of its pieces, or
 the parallel elements of a patch under a constant load.
 """
 
@@ -23,7 +23,7 @@ from ...time_steps.contacts import Contact, PointSet
 from ...time_steps.systems import find_stiffness
 from ..bench import shear
 from ..patch import faces
-from . import bond_lists, joints
+from . import bands, bond_lists, joints
 
 # Largest number of shear modes, and that of laws whose points have the compliance of the modes left out: for Coulomb's law
 # the loop area then has an error of 5e-4
@@ -32,7 +32,7 @@ MAX_MODES = 16
 
 
 class Surface(NamedTuple):
-    """Interface, or a strip of it.
+    """Interface, or a band of its face.
 
     - keys: effective keys of its law
     - total: load [N] on the whole contact, to which stiffness and damping in the keys refer
@@ -99,12 +99,13 @@ def make_contact(model: Model, numerics, patch) -> Contact:
 
 
 def _needs_lists(model: Model, numerics) -> bool:
-    """Return whether a model has a list of bonds, or a shape on the lower piece."""
+    """Return whether a model has a list of bonds, a shape on the lower piece or a face that slips part by part."""
     if model.friction is None:
         return False
     has_bonds = law_has_trait(model.friction.law, "bonds")
     has_list = has_bonds and bond_lists.choose_bond_summation(model, numerics).engine != "recursion"
-    return has_list or model.side == "lower"
+    is_soft_face = model.partial_slip and model.patch is not None and model.patch.area is not None
+    return has_list or is_soft_face or model.side == "lower"
 
 
 def _find_load(model: Model, patch) -> dict:
@@ -155,7 +156,7 @@ def _list_element_joints(model: Model, numerics, patch) -> list[joints.Joint]:
 
 
 def _list_surfaces(model: Model, numerics, patch) -> list[Surface]:
-    """Return the interfaces of a rig, or the strips of its patch that have forces of their own."""
+    """Return the interfaces of a rig, or the bands of its face that slide apart."""
     rig = model.rig
     rows = rig.modes.interfaces
     if patch is not None:
@@ -163,17 +164,12 @@ def _list_surfaces(model: Model, numerics, patch) -> list[Surface]:
         total = float(patch.pressure.load)
         force = patch.pressure.sigma_n * patch.pieces.interface.weight
         compliance = patch.slip_compliance if model.partial_slip else None
-        is_apart = rig.friction.strips_slide_apart
-        if patch.strips is None or not (is_apart or model.partial_slip):
-            return [Surface(keys, total, force, compliance, rows[0])]
-        # The strips are not coupled: each has its fraction of the width, and so a larger compliance.
-        forces = patch.state.force
-        if compliance is not None:
-            compliance = compliance * len(forces)
-        if not is_apart:
-            together = np.kron(np.eye(len(forces)), compliance)
-            return [Surface(keys, total, forces.ravel(), together, rows[0])]
-        return [Surface(keys, total, force, compliance, row) for force, row in zip(forces, rows)]
+        if rig.friction.bands_slide_apart and not model.partial_slip:
+            loads = bands.compute_band_loads(patch)
+            return [
+                Surface(keys, total, np.array([load]), None, row) for load, row in zip(loads, rows)
+            ]
+        return [Surface(keys, total, force, compliance, rows[0])]
 
     surfaces = []
     for k, interface in enumerate(rig.friction.interfaces):
@@ -200,7 +196,7 @@ def _make_points(model: Model, numerics, surface: Surface, *, moves: bool) -> Po
     numerics : Numerics
         Number of shear modes; None: set by the tolerance.
     surface : Surface
-        Interface or strip.
+        Interface or band.
     moves : bool
         Whether heave and pitch change its pressure, so that every node has a load of its own.
     """

@@ -33,7 +33,7 @@ from .solution import Solution
 CONTACTS_WITHOUT_STATIC_CURVE = (
     "the contact slides on grooves",
     "the normal load changes",
-    "the strips of the patch slide independently of one another",
+    "the bands of the face slide independently of one another",
 )
 UNKNOWN_LOOP_REASON = (
     "the hysteresis loop of this friction law is not known without a computation in time"
@@ -249,7 +249,7 @@ def estimate_decay_mesh_errors(
     if not (model.partial_slip or rig.friction.has_partial_slip):
         return unknown
 
-    moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)
+    moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.bands_slide_apart)
     if any(moves):
         return unknown._replace(reason=CONTACTS_WITHOUT_STATIC_CURVE[moves.index(True)])
 

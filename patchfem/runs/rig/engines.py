@@ -267,13 +267,13 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
         Results of the run.
     """
     averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
-    strips_slide_apart = model.rig.friction.strips_slide_apart
-    is_smooth = (strips_slide_apart or averaged) and not model.partial_slip
+    bands_slide_apart = model.rig.friction.bands_slide_apart
+    is_smooth = (bands_slide_apart or averaged) and not model.partial_slip
     rule = second_order_errors if is_smooth else convergence_errors
     depends = coarse is not None and bool(model.partial_slip or is_smooth)
     meshes = _list_coarse_meshes(model, numerics, has_coarse_patch=depends)
     coarser_runs = [CoarserRuns((mesh,), rule, source="mesh") for mesh in meshes]
-    if strips_slide_apart:
+    if bands_slide_apart:
         coarser_runs.insert(0, CoarserRuns((), estimate_sampling_errors, source="samples"))
     return coarser_runs
 

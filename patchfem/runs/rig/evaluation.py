@@ -182,7 +182,7 @@ class RunEvaluator:
         return values
 
     def is_stuck(self, run) -> bool:
-        """Return whether no interface or strip slips in the last cycles by more than `stick_tolerance` [m].
+        """Return whether no interface or band slips in the last cycles by more than `stick_tolerance` [m].
 
         A law that creeps never sticks.
         """

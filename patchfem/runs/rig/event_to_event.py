@@ -29,7 +29,7 @@ from ...response.ringing import compute_stuck_vibration, select_strongest
 from ...response.rows import select_names
 from ...structure.drive_sizes import is_sinusoidal
 from ...structure.histories import find_accelerations
-from . import engines, strips
+from . import bands, engines
 from .evaluation import EngineRun, RunEvaluator, compute_sampled_work, compute_work_check
 from .joints import Joints, make_joints
 from .sample_times import (
@@ -47,8 +47,8 @@ from .solution import (
 )
 
 SAME_SAMPLE_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
-# Measures of the motion, of the whole run and of its balance are those of the engine also for strips.
-STRIP_MEASURE_GROUPS = ("curve", "run", "error")
+# Measures of the motion, of the whole run and of its balance are those of the engine also for bands.
+BAND_MEASURE_GROUPS = ("curve", "run", "error")
 # Outcomes of motions that the engine ends early, by its status
 EARLY_OUTCOME_BY_STATUS = {
     Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
@@ -114,7 +114,7 @@ class LumpedEvaluator(RunEvaluator):
         super().__init__(model, numerics, patch, joints.contact, joints.stick_tolerance)
         self.joints = joints
         self.is_rigid = bool(joints.laws) and all(is_rigid(law.law) for law, _ in joints.laws)
-        self.strips_slide_apart = model.rig.friction.strips_slide_apart and self.has_friction
+        self.bands_slide_apart = model.rig.friction.bands_slide_apart and self.has_friction
 
     def integrate(
         self, drive, cycles: float, before: EngineRun | None, frames: int = 0, progress=None
@@ -254,7 +254,7 @@ class LumpedEvaluator(RunEvaluator):
             log=self._list_events(motion, drive),
             snapshots=self._list_snapshots(histories, times.snapshots, start),
         )
-        return strips.average_over_strips(run, self.patch) if self.strips_slide_apart else run
+        return bands.average_over_bands(run, self.patch) if self.bands_slide_apart else run
 
     def _add_vertical_force(self, response: Response, drive) -> Response:
         """Return histories with the vertical force on the flanks, which carries load and lifted mass, as normal load."""
@@ -349,11 +349,11 @@ class LumpedEvaluator(RunEvaluator):
             work = window.extra["ledger"][0]
             energies = run.ledger | compute_sampled_work(window)
             values["work_check"] = compute_work_check(energies | {"booked": work[-1] - work[0]})
-        if not self.strips_slide_apart:
+        if not self.bands_slide_apart:
             return {"integrated": values}
 
         names = ["slip_start_phase"]
-        for group in STRIP_MEASURE_GROUPS:
+        for group in BAND_MEASURE_GROUPS:
             names += select_names(group)
         # The yaw does work in addition to that of the mean displacement.
         work = np.ptp(window.extra["ledger"][0, [0, -1]])

@@ -37,8 +37,8 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     sigma = patch.pressure.sigma_n
     f = model.friction
     window = solution.window
-    # Strips that slide independently have no common shear stress.
-    if model.partial_slip and patch.strips is not None:
+    # Bands that slide independently have no common shear stress.
+    if model.partial_slip and model.rig.friction.bands_slide_apart:
         return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)
@@ -70,7 +70,8 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         length = 0.0 if reduction is None else friction.record.make_law(f).length
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
         tau, local = slip.fields.compute_element_fields(patch, reduction, states, length)
-        rule = SlipRule(f.static * sigma)
+        if model.patch.area is None:
+            rule = SlipRule(f.static * sigma)
     else:
         force = list_frames("force")
         tau = np.outer(force / patch.pressure.load, sigma)

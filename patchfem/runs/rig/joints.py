@@ -22,10 +22,11 @@ from ...hybrid.laws.masing import from_elements, has_many_elements, with_all_rev
 from ...hybrid.records import LawNumbers
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
+from ...model.structure import N_YAW_BANDS
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, shear
-from ..patch import faces, jenkins_elements
-from . import bond_lists, strips
+from ..patch import area_slip, faces, jenkins_elements
+from . import bands, bond_lists
 from .numerics import Numerics
 
 NO_STEADY_LOOP = (
@@ -45,7 +46,7 @@ class Joint(NamedTuple):
     - law: effective keys of the friction law.
     - load: normal load, which may oscillate (`hybrid.cases.Load`).
     - speed: expected slip speed [m/s], from which the rest speed of bonds follows.
-    - contact_load: mean load [N] on the whole contact, of which a strip is a part; the stiffness and the damping in the
+    - contact_load: mean load [N] on the whole contact, of which a band is a part; the stiffness and the damping in the
       keys of the law refer to it.
     - stiffness, yields: stiffness [N/m] and yield displacement [m] (e,) of the parallel elements of a patch that slips
       part by part, or None for an interface that slips as a whole.
@@ -134,7 +135,7 @@ class Joints(NamedTuple):
 
 
 def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
-    """Return the interfaces of a rig, or the strips of its patch that slide apart, or [] without friction.
+    """Return the interfaces of a rig, or the bands of its face that slide apart, or [] without friction.
 
     Parameters
     ----------
@@ -190,25 +191,26 @@ def _make_point_load(point) -> Load:
 
 
 def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
-    """Return pairs of load and elements: one of the patch in [contact], or one of each strip if the strips slide apart.
+    """Return pairs of load and elements: one of the patch in [contact], or one of each band if the bands slide apart.
 
     The elements are those of a patch that slips node by node, as the last fields of a Joint: stiffness, yield
     displacement and JenkinsSet. They are () for a patch that slips as a whole.
     """
-    slide_apart = model.rig.friction.strips_slide_apart
+    slide_apart = model.rig.friction.bands_slide_apart
     load = Load(float(patch.pressure.load))
     if not (model.partial_slip and has_elements(model.friction)):
         if not slide_apart:
             return [(load, ())]
-        return [(Load(float(load)), ()) for load in strips.compute_strip_loads(patch)]
+        return [(Load(float(load)), ()) for load in bands.compute_band_loads(patch)]
 
     static = model.friction.static
     length = friction.record.make_law(model.friction, load.mean).length
-    parts = jenkins_elements.list_elements(patch, static, length)
     if slide_apart:
+        numbers = bands.number_bands(patch)
+        found = jenkins_elements.elements(patch, static, length)
+        parts = area_slip.list_band_elements(found, numbers, N_YAW_BANDS)
         return [(load, part) for part in parts]
-    # Strips of a patch that does not yaw have the same displacement.
-    return [(load, jenkins_elements.join_elements(parts))]
+    return [(load, jenkins_elements.make_elements(patch, static, length))]
 
 
 # ---- engine `hybrid`

@@ -16,7 +16,7 @@ from ...response.loops import CycleLoop
 from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ..bench.engine import BondListGuard
-from . import strips
+from . import bands
 from .bond_lists import choose_bond_summation, has_bond_list
 from .contact_points import make_contact
 from .evaluation import RunEvaluator, compute_work_check
@@ -81,7 +81,7 @@ class MarchEvaluator(RunEvaluator):
         rig = self.model.rig
         numerics = self.numerics
         # Strips that slide independently have no common shear stress, so no output frames are stored.
-        slide_apart = rig.friction.strips_slide_apart
+        slide_apart = rig.friction.bands_slide_apart
         travel = find_travel(rig)
         run = engine.march(
             rig.modes,
@@ -102,7 +102,7 @@ class MarchEvaluator(RunEvaluator):
             return run
 
         # Strips are averaged to a single interface, whose force is known at the samples.
-        run = strips.average_over_strips(run, self.patch)
+        run = bands.average_over_bands(run, self.patch)
         force = run.window.force
         return replace(run, step_force=(force[1:] + force[:-1]) / 2)
 
@@ -156,7 +156,7 @@ class MarchEvaluator(RunEvaluator):
             "run_energies": energies,
             "loop": self._compute_hysteresis_loop(run, drive),
             "slide_round_off": self.stick_tolerance if self.contact.set_valued else 0.0,
-            "is_single_interface": self.model.rig.friction.strips_slide_apart,
+            "is_single_interface": self.model.rig.friction.bands_slide_apart,
         }
 
     def _compute_hysteresis_loop(self, run, drive) -> CycleLoop | None:
@@ -172,9 +172,9 @@ class MarchEvaluator(RunEvaluator):
         window = run.window
         work = run.window_work
         # `window_work` is that of all interfaces and of impacts at stops; that of the first interface is int F dx. The
-        # friction of strips that yaw does more work than follows from their mean displacement.
+        # friction of bands that yaw does more work than follows from their mean displacement.
         friction = self.model.rig.friction
-        is_rigid_block = self.contact.set_valued and not friction.strips_slide_apart
+        is_rigid_block = self.contact.set_valued and not friction.bands_slide_apart
         if len(friction.names) > 1 or is_rigid_block:
             work = float(run.step_force @ np.diff(window.slide))
 

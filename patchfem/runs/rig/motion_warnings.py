@@ -13,6 +13,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length, format_number
+from ...model.structure import N_YAW_BANDS
 from ...motion_measures import MAX_RESTING_SLIDE_RANGE
 from ...response.outcome import describe_ringing, find_ringing, note_on_changing_drive
 from ...response.rows import AMPLITUDE
@@ -100,7 +101,7 @@ def _is_single_point(run, face: Face) -> bool:
     """
     model = run.model
     law = face.model.friction
-    can_move = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
+    can_move = model.rig.friction.load_varies or model.rig.friction.bands_slide_apart
     is_flat = not (face.partial_slip or model.side == "lower" or can_move)
     return is_flat and law is not None and not law_has_trait(law.law, "averaged")
 
@@ -187,10 +188,16 @@ def _warn_of_large_slides(run) -> list[str]:
     )
 
 
-def _note_on_fields_of_strips(run) -> Iterator[str]:
-    """Note that the fields lack slip and shear stress if strips slip part by part."""
-    if run.patch is not None and run.patch.strips is not None and run.model.partial_slip:
-        yield "strips that slip part by part have no common shear stress, so the fields contain only the pressure"
+def _note_on_fields_of_bands(run) -> Iterator[str]:
+    """Note what bands that yaw neglect: the shear between them, and the fields of slip if they slip part by part."""
+    if not run.model.rig.friction.bands_slide_apart:
+        return
+    yield (
+        f"the face yaws as {N_YAW_BANDS} bands of cells, each with its part of the friction and stiffness of the whole "
+        "face; the shear between bands that slide apart is neglected"
+    )
+    if run.model.partial_slip:
+        yield "bands that slip part by part have no common shear stress, so the fields contain only the pressure"
 
 
 def _note_on_elements_without_slip(run) -> Iterator[str]:
@@ -236,8 +243,8 @@ def note_on_creep(friction) -> list[str]:
 
 
 def _note_on_end(run) -> Iterator[str]:
-    """Note on the neglected lateral motion of strips that yaw, and on an end at the grooves, which is no defect."""
-    if run.model.rig.friction.strips_slide_apart:
+    """Note on the neglected lateral motion of a face that yaws, and on an end at the grooves, which is no defect."""
+    if run.model.rig.friction.bands_slide_apart:
         yield "the yaw also moves the ends of the patch across x; this motion and its friction are neglected"
     if run.solution.message and run.solution.outcome is Outcome.LEAVES_GROOVES:
         yield run.solution.message
@@ -252,7 +259,7 @@ MOTION_WARNINGS = (
     _warn_of_large_slides,
 )
 MOTION_NOTES = (
-    _note_on_fields_of_strips,
+    _note_on_fields_of_bands,
     _note_on_elements_without_slip,
     _note_on_smallest_slip_of_onset,
     lambda run: note_on_creep(run.model.friction),

@@ -72,7 +72,7 @@ def stuck_stiffnesses(rig, chain: Chain) -> np.ndarray:
     if n_interfaces:
         for k in range(stiffness.size):
             stiffness[k] = stuck_interface_stiffness(chain, k if k < n_interfaces else 0)
-    if rig.friction.strips_slide_apart:
+    if rig.friction.bands_slide_apart:
         stiffness /= stiffness.size
     return stiffness
 

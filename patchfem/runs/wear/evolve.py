@@ -14,28 +14,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.press import compute_strip_offsets
 from ...core import PatchfemError, frozen_array
 from ...model.patch import PatchPiece
 from ...points.checkpoint import RETRY_ADVICE, read_state, write_state
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
+from ..patch import area
 from ..patch.measures import with_static_measures
 from ..patch.press import (
     Patch,
     Patches,
     make_contact_force_function,
-    nodal_areas,
     solve_patch_contact,
 )
 from ..patch.values import compute_static_values
 from ..results.patch_rows import Values
 from .slip import (
     CycleSlip,
+    bands_slide_independently,
     choose_frame_count,
     compute_cycle_slip,
     slips_uniformly,
-    strips_slide_independently,
 )
 
 # Largest remaining fraction of the coating thickness at which the coating counts as worn through.
@@ -49,10 +48,9 @@ class WearMoment(NamedTuple):
     """Contact, slip path and measures of a worn patch after a number of cycles.
 
     - cycle: number of cycles.
-    - depth: worn depth (m,) [m], (s, m) for strips.
-    - used: slip path per cycle (m,) [m] in the last jump, (s, m) for strips.
-    - pressure, gap (m,): pressure [Pa] and gap under load [m]; for strips the mean pressure and
-      the smallest gap over the width.
+    - depth: worn depth (m,) [m].
+    - used: slip path per cycle (m,) [m] in the last jump.
+    - pressure, gap (m,): pressure [Pa] and gap under load [m].
     - miss: relative error of the slip path due to the finite number of frames.
     - values: measures of the patch and of the motion by name.
     """
@@ -73,7 +71,7 @@ class WornPatch:
     - patch, coarse: worn patch, and those on coarser meshes (None for a missing one).
     - state: final state; None if nothing was worn.
     - moments: WearMoment before any wear and after each jump.
-    - depths: worn depths (k,) [m] on the nodes of each coarser mesh, (s, k) for strips.
+    - depths: worn depths (k,) [m] on the nodes of each coarser mesh.
     - seconds: CPU seconds.
     - stopped: reason why the computation ended early; "" if it did not.
     """
@@ -104,21 +102,21 @@ class _SlipPathFunction:
 
     def __init__(self, model, patch):
         self.model = model
-        self.pair = patch.pair
+        self.patch = patch
         self.frames = choose_frame_count(model.accuracy.tolerance)
         self.same = (
             model.grooves is None
             and model.wear.friction is None
-            and not strips_slide_independently(model)
+            and not bands_slide_independently(model)
             and slips_uniformly(model)
         )
         self.last: CycleSlip | None = None
 
     def __call__(self, worn) -> np.ndarray:
-        """Return the slip path (m,) [m] per cycle at a worn depth [m]; (s, m) for strips."""
+        """Return the slip path (m,) [m] per cycle at a worn depth [m]."""
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
-            patch = solve_patch_contact(self.model.patch, self.pair, worn)
+            patch = solve_worn(self.patch, worn)
             slip = compute_cycle_slip(make_worn_model(self.model, patch, worn), patch, self.frames)
             if slip.outcome is not None:
                 raise _UnboundedMotion(slip.outcome.sentence)
@@ -129,10 +127,10 @@ class _SlipPathFunction:
 def compute_mean_worn_depth(patch, depth) -> float:
     """Return the mean worn depth [m] of a patch, i.e. worn volume divided by area.
 
-    `depth` [m] is the worn depth (m,), or (s, m) for strips.
+    `depth` [m] is the worn depth (m,).
     """
-    area = patch.pieces.interface.weight
-    return float(np.atleast_2d(depth).mean(axis=0) @ area / area.sum())
+    weight = patch.pieces.interface.weight
+    return float(depth @ weight / weight.sum())
 
 
 def make_worn_model(model, patch, depth):
@@ -146,7 +144,7 @@ def make_worn_model(model, patch, depth):
         Unworn model with [wear].
     patch : Patch
         Patch on whose nodes the depth is given.
-    depth : (m,) or (s, m)
+    depth : (m,)
         Worn depth [m].
     """
     wear = model.wear
@@ -197,9 +195,9 @@ def compute_wear(
 
     motion = _SlipPathFunction(model, patch)
     problem = WearProblem(
-        make_contact_force_function(patch_model, patch.pair),
+        _make_force_function(patch),
         motion,
-        nodal_areas(patch_model, patch.pieces.interface),
+        patch.pieces.interface.weight,
         model.wear.coefficient,
         n_cycles,
     )
@@ -214,7 +212,7 @@ def compute_wear(
             state = make_initial_wear_state(problem, earlier_depth)
             moments = (_record_moment(patch, state, motion),)
         else:
-            patch = solve_patch_contact(patch_model, patch.pair, frozen_array(state.depth))
+            patch = solve_worn(patch, frozen_array(state.depth))
     except _UnboundedMotion as reason:
         stop_reason = f"nothing was worn: {reason}"
 
@@ -229,7 +227,7 @@ def compute_wear(
                 f"wear was computed only up to cycle {state.cycle:.6g} of {n_cycles:.6g}: {reason}"
             )
             break
-        patch = solve_patch_contact(patch_model, patch.pair, frozen_array(state.depth))
+        patch = solve_worn(patch, frozen_array(state.depth))
         moments = (*moments, _record_moment(patch, state, motion))
         if store is not None:
             store(state, moments)
@@ -243,7 +241,8 @@ def compute_wear(
             replayed.append(_replay_wear(patch_model, model, patch, mesh, moments))
 
     worn = (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None))
-    patch, *worn = with_static_measures((patch, *worn), model.accuracy.tolerance)
+    add_measures = with_static_measures if patch_model.area is None else area.with_face_measures
+    patch, *worn = add_measures((patch, *worn), model.accuracy.tolerance)
     return WornPatch(
         patch,
         tuple(worn),
@@ -271,7 +270,7 @@ class WornCoating(NamedTuple):
 def find_worn_through_coating(model, depth) -> WornCoating | None:
     """Return the coating that is worn through at a worn depth, or None if there is none.
 
-    `depth` [m] is the worn depth of both pieces together (m,), or (s, m) for strips.
+    `depth` [m] is the worn depth of both pieces together (m,).
     """
     coating = _most_worn_coating(model, depth)
     return coating if coating.fraction >= 1 - WORN_THROUGH_FRACTION else None
@@ -399,15 +398,36 @@ def _add_earlier_wear(model, patch):
     if earlier_run is None:
         return patch
     earlier_run.require_same_surfaces(patch.x, patch.unloaded_gap)
-    area = nodal_areas(model.patch, patch.pieces.interface)
-    depth = frozen_array(model.wear.compute_earlier_depth(patch.x, area))
+    areas = patch.pieces.interface.weight
+    depth = frozen_array(model.wear.compute_earlier_depth(patch.x, areas))
     if (coating := find_worn_through_coating(model, depth)) is not None:
         raise PatchfemError(
             f"{earlier_run.path}: in that run the coating of the {coating.piece} piece was worn through; choose a "
             "run in which this coating was not worn through",
             "wear.start",
         )
-    return solve_patch_contact(model.patch, patch.pair, depth)
+    return solve_worn(patch, depth)
+
+
+def solve_worn(patch, worn):
+    """Solve the contact of a patch again on its mesh or cells, with a worn depth [m] added to its unworn gap."""
+    if patch.model.area is not None:
+        return area.press_worn(patch, worn)
+    return solve_patch_contact(patch.model, patch.pair, worn)
+
+
+def compute_values(patch) -> Values:
+    """Return the values of all static measures of a patch by name, in SI units."""
+    if patch.model.area is not None:
+        return area.compute_face_values(patch)
+    return compute_static_values(patch)
+
+
+def _make_force_function(patch):
+    """Return a function of worn depth and softening that computes the contact forces [N] (`wear.depth.Press`)."""
+    if patch.model.area is not None:
+        return area.make_force_function(patch)
+    return make_contact_force_function(patch.model, patch.pair)
 
 
 def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMoment:
@@ -418,7 +438,7 @@ def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMo
     """
     model = motion.model
     worn = make_worn_model(model, patch, state.depth)
-    measures = compute_static_values(patch) | motion.last.values
+    measures = compute_values(patch) | motion.last.values
     measures |= compute_worn_volume_and_depth(model.patch, patch, state.depth)
 
     # Wear changes the grooves and, by a table, the friction law.
@@ -446,27 +466,27 @@ def compute_worn_volume_and_depth(patch_model, patch, depth) -> Values:
     Parameters
     ----------
     patch_model : PatchModel
-        Model of the patch, with its number of strips.
+        Model of the patch.
     patch : Patch
         Patch on whose nodes the depth is given.
-    depth : (m,) or (s, m)
+    depth : (m,)
         Worn depth [m].
     """
     return {
-        "worn_volume": float(np.vdot(depth, nodal_areas(patch_model, patch.pieces.interface))),
+        "worn_volume": float(np.vdot(depth, patch.pieces.interface.weight)),
         "worn_depth_max": float(depth.max(initial=0.0)),
     }
 
 
 def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch, np.ndarray]:
-    """Repeat the jumps of a run on another mesh or with another number of strips.
+    """Repeat the jumps of a run on another mesh.
 
     The slip paths are interpolated. Returns the worn patch and its worn depth [m].
 
     Parameters
     ----------
     patch_model : PatchModel
-        Model of the other patch, which has its number of strips.
+        Model of the other patch.
     model : Model
         Model of the run.
     patch, other_patch : Patch
@@ -474,32 +494,26 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
     moments : sequence of WearMoment
         States after each jump of the run.
     """
-    area = nodal_areas(patch_model, other_patch.pieces.interface)
-    width = patch_model.pieces.width
-    offsets = compute_strip_offsets(width, len(np.atleast_2d(area)))
+    areas = other_patch.pieces.interface.weight
 
     def interpolate_path(path) -> np.ndarray:
-        """Interpolate a slip path to the nodes and strips of the other patch.
-
-        Without strips there is a single row.
-        """
-        rows = np.array([np.interp(other_patch.x, patch.x, row) for row in np.atleast_2d(path)])
-        row_offsets = compute_strip_offsets(width, len(rows))
-        columns = [np.interp(offsets, row_offsets, column) for column in rows.T]
-        return np.array(columns).T.reshape(area.shape)
+        """Interpolate a slip path to the nodes or cells of the other patch."""
+        if patch_model.area is not None:
+            return area.transfer_to_grid(path, patch, other_patch)
+        return np.interp(other_patch.x, patch.x, path)
 
     # Cycles of each jump, and the slip path with which the run wore the patch
     jumps = []
     for before, after in pairwise(moments):
         jumps.append((after.cycle - before.cycle, interpolate_path(after.used)))
     depth = replay_jumps(
-        make_contact_force_function(patch_model, other_patch.pair),
-        area,
+        _make_force_function(other_patch),
+        areas,
         model.wear.coefficient,
         jumps,
-        model.wear.compute_earlier_depth(other_patch.x, area),
+        model.wear.compute_earlier_depth(other_patch.x, areas),
     )
-    return solve_patch_contact(patch_model, other_patch.pair, frozen_array(depth)), depth
+    return solve_worn(other_patch, frozen_array(depth)), depth
 
 
 def compute_and_save_wear(storage, key: str, model, patch, coarse, progress=None) -> WornPatch:

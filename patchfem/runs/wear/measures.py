@@ -13,17 +13,16 @@ from ...convergence import convergence_error
 from ...core import Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...response.errors import convergence_errors
-from ..patch.press import nodal_areas, solve_patch_contact
-from ..patch.result import UNCOUPLED_STRIPS_WARNING
-from ..patch.values import compute_static_values
 from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
 from ..results.result import UNBOUNDED_OUTCOMES, WearHistory
 from .evolve import (
     WORN_THROUGH_FRACTION,
     compute_mean_worn_depth,
+    compute_values,
     compute_worn_volume_and_depth,
     find_worn_through_coating,
     list_worn_pieces,
+    solve_worn,
 )
 from .slip import compute_point_slip_path
 
@@ -63,9 +62,6 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
         return replace(result, measures=result.measures | volume)
 
     warnings = [*result.warnings, *([evolved.stopped] if evolved.stopped else [])]
-    # Wear may make the pressures of level strips different.
-    if evolved.patch.has_unequal_strips and UNCOUPLED_STRIPS_WARNING not in warnings:
-        warnings.append(UNCOUPLED_STRIPS_WARNING)
     result = replace(result, seconds=result.seconds | {"wear": evolved.seconds}, warnings=warnings)
     if evolved.state is None:
         return result
@@ -123,11 +119,10 @@ def _note_on_worn_through_coating(model, evolved) -> list[str]:
     """
     depth = evolved.state.depth
     coating = find_worn_through_coating(model, depth)
-    strip, node = divmod(int(np.argmax(depth)), evolved.patch.x.size)
+    node = int(np.argmax(depth))
     place = f"x = {format_length(float(evolved.patch.x[node]), 3)}"
-    if model.patch.interface.strips is not None:
-        offset = float(evolved.patch.strips.offsets[strip])
-        place += f" of the strip at y = {format_length(offset, 3)}"
+    if model.patch.area is not None:
+        place += f", y = {format_length(float(evolved.patch.y[node]), 3)}"
     return [
         f"the coating of the {coating.piece} piece, {format_length(coating.thickness)}, is worn through at {place} after "
         f"{format_number(evolved.state.cycle, 4)} of {format_number(model.wear.cycles, 7)} cycles; "
@@ -149,12 +144,9 @@ def _widen_errors_by_jumps(result, evolved):
     evolved : WornPatch
         The worn patch with its jumps, also on the coarser meshes.
     """
-    patch_model = result.plan.model.patch
     coarse_depth = frozen_array(evolved.state.coarse_depth)
-    coarse = compute_static_values(
-        solve_patch_contact(patch_model, evolved.patch.pair, coarse_depth)
-    )
-    fine_values = compute_static_values(evolved.patch)
+    coarse = compute_values(solve_worn(evolved.patch, coarse_depth))
+    fine_values = compute_values(evolved.patch)
     measures = dict(result.measures)
     for name, value in fine_values.items():
         measure = measures.get(name)
@@ -192,7 +184,7 @@ def _relative_slip_error(measures: Measures) -> float:
 def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool = True) -> Measures:
     """Return the measures of worn volume, worn depth and groove amplitude.
 
-    Their errors include those of the earlier run. Strips with different pressures have no errors.
+    Their errors include those of the earlier run.
 
     Parameters
     ----------
@@ -208,7 +200,7 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool =
     state = evolved.state
     first = evolved.moments[0]
     last = evolved.moments[-1]
-    area = nodal_areas(model.patch, evolved.patch.pieces.interface)
+    area = evolved.patch.pieces.interface.weight
     slip_error = last.miss + _relative_slip_error(motion) + _relative_slip_change(last, motion)
     jump_errors = {
         "worn_volume": float(np.vdot(np.abs(state.depth - state.coarse_depth), area))
@@ -230,7 +222,7 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool =
         error = None
         worn_before = first.values[name]
         start_error = 0.0 if start is None else start.measure_error(name, worn_before)
-        has_error = coarse and with_errors and not evolved.patch.has_unequal_strips
+        has_error = coarse and with_errors
         if has_error and start_error is not None:
             error = (
                 jump_errors[name]
@@ -287,7 +279,7 @@ def _measure_worn_friction(model, evolved, motion: Measures, error: float | None
         return measures
 
     # Rate of a measure: change per change of the mean worn depth in a jump.
-    static_names = compute_static_values(evolved.patch)
+    static_names = compute_values(evolved.patch)
     for name, measure in motion.items():
         if measure.error is None or name in static_names:
             continue
@@ -369,8 +361,7 @@ def _measure_point_volume(model, result, *, with_errors: bool = True) -> Measure
 def _add_wear_frames(result, evolved):
     """Insert frames of the wear history before the frames of the last cycle in a Result.
 
-    The time of a wear frame is its cycle number times the period; the last cycle follows. The worn
-    depth of strips is (frame, strip, x).
+    The time of a wear frame is its cycle number times the period; the last cycle follows.
     """
     model = result.plan.model
     if model.rig is not None:

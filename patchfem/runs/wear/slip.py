@@ -2,7 +2,7 @@
 
 In: a model and its worn patch. Out: `CycleSlip` with the path, its error and the outcome of the motion. A point with
 the pressure p wears by L p per cycle with the path L, the integral of w |ds|/p over its slip s: w is the normal
-traction (Archard), or the friction traction with form 'energy'. The points are the whole patch, its strips or its nodes.
+traction (Archard), or the friction traction with form 'energy'. The points are the whole patch, its bands or its nodes.
 """
 
 from math import ceil, sqrt
@@ -16,11 +16,11 @@ from ...response.rows import AMPLITUDE
 from ..bench import bench
 from ..bench.engine import steps_per_cycle
 from ..bench.slides import integrate_steps
-from ..patch.press import nodal_areas
+from ..patch import area
 from ..results.patch_rows import Values
 from ..results.result import UNBOUNDED_OUTCOMES
 from ..results.travel import check_pieces_overlap
-from ..rig import fields, numerics, solve
+from ..rig import bands, fields, numerics, solve
 
 MIN_CYCLE_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
@@ -32,7 +32,7 @@ SLIP_PATH_REVERSAL_ERROR_FACTOR = 1.5
 class CycleSlip(NamedTuple):
     """Slip path of the interface nodes in one cycle of a motion.
 
-    - path: slip path [m] of each node (m,), (s, m) for strips. With form 'energy' it is the
+    - path: slip path [m] of each node (m,). With form 'energy' it is the
       friction work per area divided by the pressure; over grooves it is the path along their
       flanks.
     - error: relative error due to the finite number of frames and to differences between cycles.
@@ -47,7 +47,7 @@ class CycleSlip(NamedTuple):
 
 
 class _Cycle(NamedTuple):
-    """Motion of p points at the k samples of one cycle: the whole interface, its strips or its nodes.
+    """Motion of p points at the k samples of one cycle: the whole interface, its bands or its nodes.
 
     - slide (k,): relative displacement of the holders [m].
     - slip (k, p): slip [m].
@@ -142,7 +142,7 @@ def choose_frame_count(tolerance: float) -> int:
 
 
 def slips_uniformly(model) -> bool:
-    """Return whether all points of a patch, or of each of its strips, slip by equal distances.
+    """Return whether all points of a patch, or of each of its bands, slip by equal distances.
 
     This holds if the patch has no partial slip and its pressure moves with the upper piece. A pressure that rests on the
     lower piece passes over the points of the upper one, so that they do not slip alike.
@@ -150,9 +150,9 @@ def slips_uniformly(model) -> bool:
     return not model.partial_slip and model.side == "upper"
 
 
-def strips_slide_independently(model) -> bool:
-    """Return whether the strips slide independently, so that their motion depends on the wear."""
-    return model.rig is not None and model.rig.friction.strips_slide_apart
+def bands_slide_independently(model) -> bool:
+    """Return whether bands slide independently, so that their motion depends on the wear."""
+    return model.rig is not None and model.rig.friction.bands_slide_apart
 
 
 def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
@@ -174,11 +174,11 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     # The slip follows from the histories if it is uniform, else from the frames of the cycle.
     if motion.nodes is not None:
         path, error = _integrate_node_slip(model, patch, motion.nodes)
-    elif strips_slide_independently(model):
-        path, error = _integrate_strip_slip(model, patch, motion.window, cycle)
+    elif bands_slide_independently(model):
+        path, error = _integrate_band_slip(model, patch, motion.window, cycle)
     else:
         path, error = _integrate_uniform_slip(model, cycle)
-        path = np.full(nodal_areas(model.patch, patch.pieces.interface).shape, path)
+        path = np.full(patch.pieces.interface.weight.shape, path)
     if model.rig is not None:
         error += _slip_amplitude_change(motion.values, cycle)
     outcome = check_pieces_overlap(motion.outcome, model.patch, patch, motion.slide)
@@ -353,21 +353,19 @@ def _integrate_uniform_slip(model, cycle: _Cycle) -> tuple[float, float]:
     return path, abs(path - coarse) / path
 
 
-def _integrate_strip_slip(model, patch, window, cycle: _Cycle) -> tuple[np.ndarray, float]:
-    """Return the paths (s, m) [m] of the strips of a rig with yaw, and their relative error.
+def _integrate_band_slip(model, patch, window, cycle: _Cycle) -> tuple[np.ndarray, float]:
+    """Return the paths (m,) [m] of the cells of a face with yaw, which are those of its bands, and their relative error.
 
-    The slip is that in the direction of the drive. An open strip has the path of the nearest strip in contact. `patch`
-    is in strips, `window` has the histories of the last cycles with those of the strips, and `cycle` is that of the
-    whole interface.
+    The slip is that in the direction of the drive. An open band has the path of the nearest band in contact. `window` has
+    the histories of the last cycles with those of the bands, and `cycle` is that of the whole interface.
     """
-    loads = patch.strips.force.sum(axis=1)
+    loads = bands.compute_band_loads(patch)
     is_last = _is_in_last_cycle(model, window)
     slips = window.extra.get("slips", window.extra["slides"])[is_last]
     forces = window.extra["forces"][is_last]
-    strips = _Cycle(cycle.slide, slips, forces, loads[None], loads)
-    points = _make_point_slip(model, strips)
-    path = points.path[_find_nearest_contact(patch.strips.offsets, loads > 0)]
-    path = np.repeat(path[:, None], patch.x.size, axis=1)
+    points = _make_point_slip(model, _Cycle(cycle.slide, slips, forces, loads[None], loads))
+    nearest = _find_nearest_contact(np.arange(loads.size, dtype=float), loads > 0)
+    path = points.path[nearest][bands.number_bands(patch)]
     return path, points.estimate_reversal_error(loads)
 
 
@@ -390,6 +388,8 @@ def _integrate_node_slip(model, patch, nodes: _Cycle) -> tuple[np.ndarray, float
             along_flank - elastic * path_ratio, points.weight / path_ratio, points.is_closed
         )
     error = points.estimate_reversal_error(sigma * patch.pieces.interface.weight)
+    if model.patch.area is not None:
+        return points.path[area.find_nearest_contact(patch)], error
     return points.path[_find_nearest_contact(patch.x, sigma > 0)], error
 
 

@@ -40,7 +40,8 @@ _OTHER_WAVEFORM_KEYS = " ".join(
 )
 ALTERNATIVE_KEYS = {  # keys of which a table always needs one
     contact.Contact: "load|approach",
-    contact.LoadLine: "offset|moment",
+    contact.LoadLine: "offset/moment/across",
+    contact.ProfileFile: "file|scan",
     contact.Holder: "rotational_stiffness/tangential_stiffness",
     tables.Interface: "load|contact",
     tables.Structure: "mode|masses|file|reduced",

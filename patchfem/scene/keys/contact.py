@@ -19,6 +19,7 @@ from .types import (
     Position,
     Positive,
     Table,
+    array,
     key,
     list_inner_tables,
     number,
@@ -31,8 +32,10 @@ from .values import TomlValue
 Piece = Literal["upper", "lower"]
 LengthUnit = Literal[tuple(UNIT_FACTORS["length"])]
 MAX_EQUAL_PATCHES = 1_000_000  # largest number of equal patches, far more than any joint has
-# Largest number of strips over the width; the pressures of more strips do not fit into memory.
-MAX_STRIPS = 10_000
+# Smallest and largest number of cells along the longer side of an area; the grids of the error estimate have a half and a
+# quarter of them, and more cells than 1024 take minutes.
+MIN_AREA_CELLS = 32
+MAX_AREA_CELLS = 1024
 # Largest angle [rad] between the pieces; the gap is angle * x, which differs from tan(angle) * x by 0.3 % there.
 MAX_ANGLE_BETWEEN_PIECES = 0.1
 SmallAngle = quantity("angle", ge=-MAX_ANGLE_BETWEEN_PIECES, le=MAX_ANGLE_BETWEEN_PIECES)
@@ -115,11 +118,15 @@ class OnePiece(Table):
 
 
 class Tilt(Table):
-    """A prescribed angle between the pieces; `on` names the piece that is tilted."""
+    """Prescribed angles between the pieces; `on` names the piece that is tilted."""
 
     angle: key(
         SmallAngle,
         "angle between the pieces; an angle > 0 opens the gap at +x; the gap is this angle times x, so it must be small",
+    )
+    roll: optional(
+        SmallAngle,
+        "angle between the pieces about x, beside [contact.area]; an angle > 0 opens the gap at +y; default: 0",
     )
     on: key(
         Piece,
@@ -133,6 +140,11 @@ class LoadLine(Table):
     offset: optional(
         Position,
         "distance of the load line from the middle of the patch; an offset > 0 moves the pressure towards +x",
+    )
+    across: optional(
+        Position,
+        "distance of the load line from the middle along y, beside [contact.area]; the upper piece is then free to "
+        "rotate about x",
     )
     moment: optional(
         quantity("moment"),
@@ -177,11 +189,16 @@ def require_convex_radius(value: TomlValue) -> TomlValue:
 
 
 class Crown(Table):
-    """A cylindrical crown on one piece."""
+    """A cylindrical crown on one piece, or one with two radii."""
 
     radius: key(
         Annotated[Length, BeforeValidator(require_convex_radius)],
         "radius of the crown: the gap grows as x^2/(2 radius)",
+    )
+    across: optional(
+        Annotated[Length, BeforeValidator(require_convex_radius)],
+        "radius of the crown across its width, beside [contact.area]: the gap also grows as y^2/(2 across); a sphere "
+        "has two equal radii; default: flat across",
     )
     on: key(
         Piece,
@@ -203,14 +220,22 @@ class Step(Table):
 class ProfileFile(Table):
     """Measured heights that are added to the gap."""
 
-    file: key(
+    file: optional(
         FileName,
         "file of one height trace along x: text with units in its header, or a file of a measuring instrument",
+    )
+    scan: optional(
+        FileName,
+        "file of an areal scan, beside [contact.area] and in place of `file`; spikes are removed and the scan is levelled",
+    )
+    at: optional(
+        array(Position, 2, 2),
+        "place of the patch on the scan: x and y of its middle, as the file counts them; default: the middle of the scan",
     )
     heights: key(
         Literal["gap", "surface"],
         "'gap': a larger height opens the gap; 'surface': the file is a stylus "
-        "trace, so a larger height is more material on the piece that `on` names",
+        "trace or a scan, so a larger height is more material on the piece that `on` names",
     ) = "gap"
     on: key(
         Piece,
@@ -292,25 +317,17 @@ class Grooves(Table):
     ) = 0.0
 
 
-def compute_outermost_strip_distance(width: float, count: int) -> float:
-    """Return the distance [m] from the middle of the patch to the middle of its outermost strip.
+class Area(Table):
+    """Pressure, slip and wear vary over the face, not only along x; no keys are required."""
 
-    `count` equal strips lie side by side over the width [m]. A load line must lie within this distance.
-    """
-    return width / 2 * (1 - 1 / count)
-
-
-class Strips(Table):
-    """The patch is divided over its width into equal parallel strips."""
-
-    count: key(whole_number(1, MAX_STRIPS), "number of equal parallel strips over the width")
-    roll: key(
-        SmallAngle,
-        "angle by which the holder is rotated about x, which shifts the pressure sideways",
-    ) = 0.0
-    offset: optional(
-        Position,
-        "lateral position of the load line; if this key is given, the upper piece is free to rotate about x",
+    cells: optional(
+        whole_number(MIN_AREA_CELLS, MAX_AREA_CELLS),
+        "number of cells along the longer side of the face; default: doubled until the tolerance is met",
+    )
+    hardness: optional(
+        quantity("pressure", gt=0),
+        "largest pressure that a cell carries (perfectly plastic); the measure yielded_fraction is the share of cells "
+        "that reach it",
     )
 
 
@@ -361,7 +378,7 @@ class Contact(Table):
     profile: ProfileFile | None = None
     asperities: Asperities | None = None
     shear: Shear | None = None
-    strips: Strips | None = None
+    area: Area | None = None
     grooves: Grooves | None = None
 
     @property

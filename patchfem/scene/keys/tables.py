@@ -221,7 +221,7 @@ class Mode(Table):
     ) = 0.0
     yaw: key(
         PerMetre,
-        "rotation of the patch about its normal per unit of the modal coordinate; needs [contact.strips]",
+        "rotation of the patch about its normal per unit of the modal coordinate; needs [contact.area]",
     ) = 0.0
     base: optional(
         Number,

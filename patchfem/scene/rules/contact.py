@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from ...effects import GAP_SHAPES
-from ..keys.contact import Contact, compute_outermost_strip_distance
+from ..keys.contact import Contact
 from ..keys.removed import describe_removed
 from .facts import TableFacts
 from .outlines import PIECE_KEYS_OF_PATCH, check_outlines, find_flat_length
@@ -41,7 +41,7 @@ def check_patches(draft: SceneDraft) -> None:
         flat_length = find_flat_length(patch)
         _check_sizes(patch, flat_length)
         _check_mesh(patch, flat_length)
-        _check_strips(patch)
+        _check_area(patch)
         _check_load_line(patch, flat_length / 2)
         _check_coatings(patch)
         _check_shapes_have_a_piece(patch)
@@ -90,23 +90,39 @@ def _check_mesh(patch: TableFacts, flat_length: float) -> None:
         )
 
 
-def _check_strips(patch: TableFacts) -> None:
-    """Report an offset of the load across the width that the strips of a patch cannot carry."""
-    if not (patch.strips and patch.has("strips.offset")):
-        return
-    if patch.strips.count < 2:
+def _check_area(patch: TableFacts) -> None:
+    """Report a load line outside a face, a hardness below the mean pressure, and unequal pieces that slip."""
+    line = patch.load_line.across
+    if abs(line) >= patch.width / 2:
         patch.add_mistake(
-            "strips.offset",
-            f"{patch.strips.count} strip cannot resist a rotation about x: raise contact.strips.count",
+            "load_line.across",
+            f"{line} m lies outside the patch: |across| < width/2 = {patch.width / 2} m is needed",
         )
-    elif patch.strips.count:
-        max_offset = compute_outermost_strip_distance(patch.width, patch.strips.count)
-        if abs(patch.strips.offset) >= max_offset:
-            patch.add_mistake(
-                "strips.offset",
-                f"{patch.strips.offset} m lies beyond the middle of the outermost strip: |offset| < {max_offset:.6g} m "
-                "is needed; raise contact.strips.count or lower the offset",
-            )
+    mean = patch.load / (patch.pairs * patch.length * patch.width)
+    if patch.area.hardness <= mean:
+        patch.add_mistake(
+            "area.hardness",
+            f"{patch.area.hardness:g} Pa is not above the mean pressure of the load, {mean:.3g} Pa, so the cells cannot "
+            "carry it: raise the hardness or lower contact.load",
+        )
+    # A normal pressure on unequal pieces also moves their faces sideways, which the cells do not couple.
+    if patch.area and patch.shear and _are_pieces_different(patch):
+        patch.add_mistake(
+            "shear",
+            "pieces of different elasticity couple pressure and shear stress, which [contact.area] neglects: make the "
+            "pieces equal, or leave out [contact.shear]",
+        )
+
+
+def _are_pieces_different(patch: TableFacts) -> bool:
+    """Return whether the two pieces of a patch have different heights, substrates or coatings."""
+    pieces = []
+    for name in PIECE_KEYS_OF_PATCH:
+        piece = patch[name].table
+        values = [getattr(piece, key, None) for key in ("height", "substrate", "coating")]
+        general = (patch.table.height, patch.table.substrate, patch.table.coating)
+        pieces.append([own or other for own, other in zip(values, general)])
+    return pieces[0] != pieces[1]
 
 
 def _check_load_line(patch: TableFacts, half_length: float) -> None:

@@ -38,7 +38,7 @@ class MotionFeatures(NamedTuple):
 
     - joints: the interfaces with friction.
     - load_change: cause of a load that changes, such as "with normal.amplitude".
-    - strips_yaw: whether the strips of the patch slide independently.
+    - bands_yaw: whether bands of cells of the patch slide independently.
     - spring: key of the nonlinear spring of the rig.
     - grooves: table of the grooves that the upper piece climbs.
     - waveform: record of the waveform of the drive, in `effects`; NO_WAVEFORM for a release and for a response curve.
@@ -48,7 +48,7 @@ class MotionFeatures(NamedTuple):
 
     joints: list[Joint]
     load_change: str
-    strips_yaw: bool
+    bands_yaw: bool
     spring: str
     grooves: str
     waveform: Waveform
@@ -68,7 +68,7 @@ class MotionFeatures(NamedTuple):
         words = {
             "no-law": "" if self.joints else "for law 'none'",
             "load": self.load_change,
-            "yaw": "with strips that yaw" if self.strips_yaw else "",
+            "yaw": "with bands that yaw" if self.bands_yaw else "",
             "yaw-levels": "",
             "parts": f"with {self.compliance}" if self.compliance else "",
             "grooves": f"with {self.grooves}" if self.grooves else "",
@@ -224,7 +224,7 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     return MotionFeatures(
         joints=[Joint(law, find_compliance_key(law, tables)) for law in laws],
         load_change=load_change and f"with {describe_load_change(load_change)}",
-        strips_yaw=bool(scene.contact.strips and find_yaw_key(tables)),
+        bands_yaw=bool(scene.contact.area and find_yaw_key(tables)),
         spring=find_nonlinear_spring(tables),
         grooves=find_climbed_grooves(tables),
         waveform=find_waveform(tables.drive),

@@ -186,18 +186,6 @@ class Joint(TableFacts):
         return next(filter(self.find_key_value, keys), "")
 
     @property
-    def can_slip_in_strips(self) -> bool:
-        """Whether partial slip is supported in each strip separately.
-
-        That needs the shear of the pieces, no spring that couples the strips, no list of bonds and no shape on the lower
-        piece.
-        """
-        patch = self.contact
-        is_coupled = patch.asperities.tangential_ratio or patch.holder.tangential_stiffness
-        is_like_points = not (self.needs_list or self.lower_shape)
-        return bool(self.kind == "rig" and patch.shear and is_like_points and not is_coupled)
-
-    @property
     def is_read(self) -> bool:
         """Whether the properties of the joint are known: it is an interface, or has a known law in a bench or a rig."""
         return self.is_interface or (self.law in LAWS and self.kind in ("bench", "rig"))
@@ -307,13 +295,13 @@ JOINT_FEATURES = {
     "shape on the lower piece": Feature(
         lambda j: j.lower_shape, "{lower_shape}", "a shape on the lower piece"
     ),
-    "patch without strips": Feature(
-        lambda j: not (j.contact and j.contact.strips), "", "a patch without [contact.strips]"
+    "patch without a face": Feature(
+        lambda j: not (j.contact and j.contact.area), "", "a patch without [contact.area]"
     ),
     "shapes on different pieces": Feature(
         lambda j: j.opposite_shape, "{opposite_shape}", "shapes on different pieces"
     ),
-    "strips that slip together": Feature(lambda j: not j.can_slip_in_strips),
+    "bands that slip together": Feature(lambda j: j.lacks("pieces", "shear")),
     "mode with yaw": Feature(lambda j: j.yaw, "{yaw}"),
     "grooves": Feature(lambda j: not j.is_interface and j.grooves, "contact.grooves", "{grooves}"),
     # interfaces

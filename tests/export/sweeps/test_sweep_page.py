@@ -167,11 +167,3 @@ def test_exact_plot_of_a_selected_value_is_its_line(folders):
         np.testing.assert_allclose(drawn.get_ydata() / drawn.get_ydata().max(), expected[1])
         with pytest.raises(pf.PatchfemError, match="a single case"):
             pf.plot.sweep(line.isel(friction_static=0), "loop_area")
-
-
-def test_sweep_of_rolled_strips_says_that_errors_are_unknown(tmp_path):
-    """Cases whose main measures have no stated error do not count as meeting the tolerance."""
-    strips = '[contact.strips]\ncount = 2\nroll = "0.01 mrad"\n[accuracy]\ntolerance = 1e-2\n'
-    pf.sweep(PATCH + strips, {"contact.load": ["50 N", "100 N"]}, out=tmp_path / "a")
-    answer = store.read_answer(tmp_path / "a")
-    assert "2 cases: 2 with an unknown error." in answer.verdict

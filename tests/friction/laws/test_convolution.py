@@ -225,8 +225,8 @@ def test_refuses_asymmetric_pressure_on_rig():
         (SHORT, ["contact.tilt.on=lower"], "a shape on the lower piece with law 'convolution'"),
         (
             SLIDE,
-            ["contact.strips.count=4"],
-            "contact.strips: not supported yet with law 'convolution'",
+            ["contact.area.cells=64"],
+            "contact.area: not supported yet with law 'convolution'",
         ),
         (SLIDE, ["friction.order=-1"], "friction.order: must be > -1, not -1"),
         (

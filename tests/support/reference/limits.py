@@ -59,8 +59,9 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
 patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected.
-Each strip of `[contact.strips]` is such a section; the strips lie side by side, without elastic coupling between them.
-Where the pressure varies over the width, as with `roll`, the static measures and those of wear have no stated error.
+With `[contact.area]` the pieces are blocks in three dimensions. Their friction acts along x alone: slip across x and the
+coupling of pressure and shear stress of unequal pieces are neglected. If a mode yaws the face, bands of cells slide by
+themselves, and the shear between bands is neglected.
 
 **Small strains, linear elasticity.** The pieces are isotropic; plasticity, creep and heat are neglected. The coating is
 bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {MAX_SMALL_STRAIN:g}.
@@ -108,8 +109,8 @@ carries the load, the true track is narrower and deeper. A [track in Ti-6Al-4V](
 is 2.1 times as deep and 0.53 times as wide as computed for its volume; those of five other tests are 0.54 to 0.64 times
 as wide. A layer of `[contact.asperities]` does not wear: its stiffness and decay length stay constant, and the worn
 depth is a mean over its waves. Wear changes the friction only through the table `[wear.friction]`, by the same factors
-at all points of the patch. Within each jump of wear, a rig is assumed to repeat its last computed cycle. If strips yaw,
-their slide and their wear are computed along x only; a note gives the motion of the ends of the patch across x.
+at all points of the patch. Within each jump of wear, a rig is assumed to repeat its last computed cycle. If a face yaws,
+its slide and its wear are computed along x only; a note gives the motion of the ends of the patch across x.
 
 **Errors.** Stated errors are estimates from coarser runs. The true numerical error is smaller than the stated error in
 about 19 of 20 scenes. Stated errors do not include what the model neglects. A step in the gap makes the pressure peak
@@ -130,7 +131,9 @@ SHAPES = [
     for header, table in iterate_tables()
     if "on" in table.model_fields
 ]
-STRIP_LAWS = [name for name, law in LAWS.items() if {"pieces", "shear"} <= {*law.supports.split()}]
+ELEMENT_LAWS = [
+    name for name, law in LAWS.items() if {"pieces", "shear"} <= {*law.supports.split()}
+]
 MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its keys.
     "bench": "`[slide]`",
     "rig": "`[drive]` with `[friction]` or `[[structure.interface]]`",
@@ -160,11 +163,9 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "patch that slips as a whole": "no partial slip",
     "partial slip": "`[patch.shear]`, `patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`",
     "shape on the lower piece": "`on` is `lower` in " + join_words(SHAPES, "or"),
-    "patch without strips": "no `[contact.strips]`",
+    "patch without a face": "no `[contact.area]`",
     "shapes on different pieces": "`on` is `upper` in one and `lower` in another of " + join_words(SHAPES, "and"),
-    "strips that slip together": "`[patch.strips]` on a bench, without `[patch.shear]`, with "
-    "`patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`, or under another law than "
-    + join_words(STRIP_LAWS, "or"),
+    "bands that slip together": "another law than " + join_words(ELEMENT_LAWS, "or"),
     "grooves": "`[contact.grooves]` or `[normal.grooves]`, with `amplitude` > 0",
     "interface": "`[[structure.interface]]`",
     "several interfaces": "at least two `[[structure.interface]]`",

@@ -51,9 +51,9 @@ period of the first mode that is not a rigid-body mode. In a release only `relat
 last whole cycle of the motion; peaks of acceleration and force, slip and stick are those of the window, in which the
 motion may still decay. The window of a bench is its last cycle; its energies, its friction work and its peaks,
 `friction_force_peak` and `friction_ratio_peak`, are those of the whole run. A measure "per cycle" is the mean over the
-cycles of the window. A number at the end of a name is the number of an interface, or of a strip if the strips slide
-separately: `slip_amplitude_2` is the slip amplitude of the second interface or strip. The floor of a displacement is at
-most 1e-5 of a/omega^2, the displacement amplitude of a drive with the acceleration amplitude a, and that of
+cycles of the window. A number at the end of a name is the number of an interface, or of a band if the bands of a face
+slide separately: `slip_amplitude_2` is the slip amplitude of the second interface or band. The floor of a displacement
+is at most 1e-5 of a/omega^2, the displacement amplitude of a drive with the acceleration amplitude a, and that of
 `friction_force_peak` at most 1e-5 of the normal load.
 """
 

@@ -52,7 +52,7 @@ acceleration = "5 g"
 cycles = 20
 """
 GROOVES = '[{}.grooves]\nwavelength = "80 um"\namplitude = "2 um"\n'
-STRIPS = "[contact.strips]\ncount = 4\n"
+AREA = "[contact.area]\ncells = 64\n"
 # Values of required keys of laws; other keys have the example of their kind, or 1
 VALUES = {"chi": "-0.5", "beta": "0.5", "bond_length": '"1 um"'}
 FORMS = {
@@ -77,13 +77,11 @@ RIGS = (
     SceneColumn("one point", POINT + RIG),
     SceneColumn("a patch", PATCH + RIG),
     SceneColumn("`[contact.shear]`", PATCH + "[contact.shear]\n" + RIG),
-    SceneColumn("`[contact.strips]`", PATCH + STRIPS + RIG),
+    SceneColumn("`[contact.area]`", PATCH + AREA + RIG),
+    SceneColumn("`[contact.area]`, `[contact.shear]`", PATCH + AREA + "[contact.shear]\n" + RIG),
     SceneColumn(
-        "`[contact.strips]`, `[contact.shear]`", PATCH + STRIPS + "[contact.shear]\n" + RIG
-    ),
-    SceneColumn(
-        "`[contact.strips]`, a mode with yaw",
-        PATCH + STRIPS + RIG,
+        "`[contact.area]`, a mode with yaw",
+        PATCH + AREA + RIG,
         ("structure.mode.axial.yaw=2 rad/m",),
     ),
     SceneColumn("shapes on the lower piece", PATCH + RIG, ("contact.crown.on=lower",)),
@@ -118,7 +116,7 @@ BENCHES = (
     SceneColumn("one point", POINT + BENCH),
     SceneColumn("a patch", PATCH + BENCH),
     SceneColumn("`[contact.shear]`", PATCH + "[contact.shear]\n" + BENCH),
-    SceneColumn("`[contact.strips]`", PATCH + STRIPS + BENCH),
+    SceneColumn("`[contact.area]`", PATCH + AREA + BENCH),
     SceneColumn("shapes on the lower piece", PATCH + BENCH, ("contact.crown.on=lower",)),
     SceneColumn(
         "changing load", POINT + BENCH, ("normal.amplitude=20 N", "normal.frequency=50 Hz")

@@ -1,0 +1,47 @@
+"""Average of the histories of bands of a face that slide independently.
+
+In: a run in which each band of cells is an interface, and the AreaPatch. Out: the run with the histories of a single
+interface. A band has the pressure of the coupled face, and its friction does not shear the other bands.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...model.structure import N_YAW_BANDS, compute_band_offsets
+
+
+def number_bands(patch) -> np.ndarray:
+    """Return the number (m,) of the band in which each cell of a face lies, counted from -y."""
+    place = patch.y / patch.model.pieces.width + 0.5
+    return np.clip((place * N_YAW_BANDS).astype(int), 0, N_YAW_BANDS - 1)
+
+
+def compute_band_loads(patch) -> np.ndarray:
+    """Return the normal load (b,) [N] on each band of a face."""
+    return np.bincount(number_bands(patch), patch.normal_stress * patch.weight, N_YAW_BANDS)
+
+
+def average_over_bands(run, patch):
+    """Return a run with the histories of independently sliding bands averaged, in `response` and `window`.
+
+    Displacement, velocity and slip are means weighted by the loads; the force is the resultant.
+    `extra` retains the histories of the bands, and gets the yaw moment (k,) [N m], i.e. the sum of
+    y f of the friction on the upper piece at the positions y of the bands.
+    """
+    loads = compute_band_loads(patch)
+    weights = loads / loads.sum()
+    offsets = compute_band_offsets(patch.model.pieces.width)
+
+    def average(histories):
+        """Return the histories of the bands as those of one interface that carries the whole load."""
+        return replace(
+            histories,
+            slide=histories.slides @ weights,
+            slide_rate=histories.extra["slide_rates"] @ weights,
+            force=histories.forces.sum(axis=1),
+            slip=histories.slips @ weights,
+            extra=histories.extra | {"yaw_moment": histories.forces @ offsets},
+        )
+
+    return replace(run, response=average(run.response), window=average(run.window))
