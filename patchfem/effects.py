@@ -268,7 +268,7 @@ EFFECTS = {
         "patchfem.friction.bonds.point_kernels", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"
     ),
     "friction.reading=report": Effect(
-        "patchfem.friction.bonds.list_kernels", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"
+        "patchfem.friction.bonds.strip_kernels", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"
     ),
     "friction.temperature": Effect(
         "patchfem.friction.bonds.temperature",

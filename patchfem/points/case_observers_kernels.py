@@ -112,13 +112,15 @@ def find_vertex(before, middle, after):
 
 
 @njit(**NJIT_KERNEL)
-def weigh(instant, dt, omega):
+def weigh(instant, rest, dt, omega):
     """Return the `Weights` of an end of a piece, by the rule that is exact for polynomials of order 5.
 
     Parameters
     ----------
     instant : Instant
         The end.
+    rest : float
+        Slide beyond which the slide is integrated [m].
     dt : float
         Duration of the piece [s], negative at its last instant.
     omega : float
@@ -128,7 +130,7 @@ def weigh(instant, dt, omega):
     half = 0.5 * size
     tilt = size * dt / 10
     bend = size * dt * dt / 120
-    q = instant.slide
+    q = instant.slide - rest
     v = instant.velocity
     real = half * q + tilt * v + bend * (instant.acceleration - omega * omega * q)
     return Weights(real, -omega * (tilt * q + 2 * bend * v))
@@ -176,21 +178,27 @@ def add_piece(piece, case, now, loop):
     first = piece.first
     last = piece.last
     dt = piece.duration
-    # Energies of damper, friction and mode; that of the drive follows from the phasor of the cycle.
+    # Energies of damper, by Simpson's rule, friction and mode; that of the drive follows from the phasor of the cycle. The
+    # velocity of a piece has one sign, and is 0 at both ends of a short slip.
     v = first.velocity
     end = last.velocity
-    squares = 0.5 * (v * v + end * end)
-    squares += dt / 6 * (v * first.acceleration - end * last.acceleration)
+    slide = last.slide - first.slide
+    middle = 1.5 * slide / dt - 0.25 * (v + end) if dt > 0 else 0.0
+    squares = (v * v + 4 * middle * middle + end * end) / 6
     now[Now.VISCOUS] += case[Number.DAMPING] * dt * squares
     now[Now.FRICTION] += case[Number.MOBILITY] * piece.work
     energy = 0.5 * (end * end + case[Number.STIFFNESS] * last.slide * last.slide)
     now[Now.STORED] = max(now[Now.STORED], energy)
-    power = abs(first.sine * v) + abs(last.sine * end)
-    now[Now.POWER] += 0.5 * dt * abs(case[Number.DRIVE]) * power
+    power = abs(case[Number.DRIVE]) * (abs(first.sine) + abs(last.sine))
+    now[Now.POWER] += 0.5 * power * abs(slide)
 
-    # Phasor and extremes
-    begin = weigh(first, dt, case[Number.OMEGA])
-    stop = weigh(last, -dt, case[Number.OMEGA])
+    # Phasor and extremes. The integral of a slide at rest is exact, so that it does no work.
+    omega = case[Number.OMEGA]
+    rest = first.slide
+    begin = weigh(first, rest, dt, omega)
+    stop = weigh(last, rest, -dt, omega)
+    now[Now.COS] += rest * (last.sine - first.sine) / omega
+    now[Now.SIN] -= rest * (last.cosine - first.cosine) / omega
     now[Now.COS] += begin.real * first.cosine + begin.imaginary * first.sine
     now[Now.COS] += stop.real * last.cosine + stop.imaginary * last.sine
     now[Now.SIN] += begin.real * first.sine - begin.imaginary * first.cosine
@@ -217,10 +225,10 @@ def add_third_harmonic(instant, dt, omega, seen):
     s = instant.sine
     cosine = c * (4 * c * c - 3)
     sine = s * (3 - 4 * s * s)
-    part = weigh(instant, dt, 3 * omega)
+    part = weigh(instant, 0.0, dt, 3 * omega)
     seen[Seen.COS_3] += part.real * cosine + part.imaginary * sine
     seen[Seen.SIN_3] += part.real * sine - part.imaginary * cosine
-    seen[Seen.SLIDE] += weigh(instant, dt, 0.0).real
+    seen[Seen.SLIDE] += weigh(instant, 0.0, dt, 0.0).real
 
 
 @njit(**NJIT_KERNEL)

@@ -42,7 +42,6 @@ from .march_rows import (
     DONE,
     EXCEEDS_TRAVEL,
     LEAVES_GROOVES,
-    LISTS_FULL,
     LOWER,
     N_PORT_COLUMNS,
     NO_CONTACT_SET,
@@ -1099,8 +1098,7 @@ def commit_list(system, j, dt):
         # Mean speeds hold in the middle of a step. A line through the last two gives the speed at the end of this one.
         values[Point.SPEED, j] = max(1.5 * speed - 0.5 * values[Point.LAST_SPEED, j], 0.0)
         values[Point.LAST_SPEED, j] = speed
-    if not lists.advance_list(points.numbers, values, system.lists, j, v0, v1, dt):
-        system.totals[Total.IS_FULL] = 1.0
+    lists.advance_list(points.numbers, values, system.lists, j, v0, v1, dt)
 
 
 @njit(**NJIT_CALL)
@@ -1266,7 +1264,6 @@ def try_step(system, level, row, begin, end, drive):
 
     if options.has_lists:
         for j in range(points.port.size):
-            values[Point.TRIAL_SLIDE, j] = np.nan
             if points.stiffness.size == 0:
                 values[Point.SPEED, j] = system.ports.values[Port.VELOCITY, points.port[j]]
 
@@ -1506,8 +1503,6 @@ def march(system, steps, samples):
                 continue
             if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
                 return i, NO_CONTACT_SET
-            if system.totals[Total.IS_FULL] > 0:
-                return i, LISTS_FULL
 
             # Mean forces and work of the friction in the whole step.
             work += add_work(system, samples[i], first_column, part / ticks)

@@ -6,15 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact.set_arrays import SetArrays
-from ..friction.bonds.list_rows_kernels import BondLists
+from ..friction.bonds.strip_rows_kernels import BondLists
 
 # Statuses of a march
 DONE = 0
 EXCEEDS_TRAVEL = 1
 NOT_FINITE = 2
 NO_CONTACT_SET = 3
-LISTS_FULL = 4
-LEAVES_GROOVES = 5
+LEAVES_GROOVES = 4
 RESULTANT = -1  # node of a point whose load is a fraction of the resultant
 LOWER = -2  # node of a point whose load is the pressure of the lower piece at its place
 RESIDUAL = 1e-12
@@ -129,7 +128,6 @@ class Total(IntEnum):
     - VISCOUS: viscous loss since the start [J]
     - STORED: largest stored energy [J]
     - ITERATIONS, UNSOLVED: numbers of Newton iterations, and of steps that did not converge
-    - IS_FULL: 1 if a list of bonds is full
     - REST: work of the drive in the last step on motions of ports at rest, which are taken back [J]
     """
 
@@ -139,8 +137,7 @@ class Total(IntEnum):
     STORED = 3
     ITERATIONS = 4
     UNSOLVED = 5
-    IS_FULL = 6
-    REST = 7
+    REST = 6
 
 
 class Sample(IntEnum):

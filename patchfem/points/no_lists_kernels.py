@@ -23,11 +23,10 @@ def write_list_mean(numbers, values, lists, j, dt):
 
 @njit(**NJIT_CALL)
 def advance_list(numbers, values, lists, j, v0, v1, dt):
-    """Report room (True) for a list that does not exist, so that the march goes on.
+    """Leave the list of a point as it is, because no point of the march has one.
 
     The point `j` and the other arguments are those of `lists_kernels.advance_list`, and are not used.
     """
-    return True
 
 
 @njit(**NJIT_CALL)

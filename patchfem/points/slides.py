@@ -12,7 +12,6 @@ from .time_march import (
     load_kernels,
     make_snapshot,
     make_system,
-    march_with_room,
     split_losses,
 )
 
@@ -54,11 +53,6 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         Samples at which the state of the points is returned.
     say, report : callable, optional
         Callbacks for a line of text and for the completed fraction.
-
-    Raises
-    ------
-    Missing
-        If lists of bonds become too long.
     """
     kernels = load_kernels(contact, say)
 
@@ -94,10 +88,8 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         step = float(time[end] - time[begin]) / size
         options = system.options._replace(step=step if step > 0 else 1.0)
         system = system._replace(structure=structure, options=options)
-        # march_with_room writes the samples, and returns the system at the end, with longer lists of bonds if needed.
         samples = np.zeros((size + 1, width))
-        place = f"after sample {begin} of the prescribed slide"
-        system = march_with_room(kernels, system, samples, place).system
+        kernels.march(system, size, samples)
         rows[begin : end + 1] = samples
         if end in frames:
             force, slip = samples[-1, Sample.PORTS : Sample.PORTS + 2]

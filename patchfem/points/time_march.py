@@ -12,10 +12,9 @@ from numpy.polynomial.legendre import leggauss
 
 from .. import compiled
 from ..contact.set_arrays import PRESENT_SLOT_INDEX, hash_set, make_set_arrays
-from ..core import Missing, ModalBasis, Outcome, Response, SineDrive
-from ..friction.bonds import list_numbers
-from ..friction.bonds.list_rows_kernels import N_ROWS, STATUS, BondLists
-from ..friction.bonds.parameters import growth_numbers
+from ..core import ModalBasis, Outcome, Response, SineDrive
+from ..friction.bonds.list_numbers import make_lists, make_no_lists
+from ..friction.bonds.strip_rows_kernels import BondLists, ListState
 from ..friction.path_work import sampled_work
 from ..motion_measures import find_reversal_steps
 from ..structure import drive_sizes
@@ -29,7 +28,6 @@ from .march_rows import (
     DONE,
     EXCEEDS_TRAVEL,
     LEAVES_GROOVES,
-    LISTS_FULL,
     N_PORT_COLUMNS,
     NO_CONTACT_SET,
     RESIDUAL,
@@ -55,13 +53,6 @@ EVENT_LEVELS = (
 SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
 REDUNDANT = 1e-10  # relative compliance of the strongest port at rest if ports outnumber the modes
 MIN_STRENGTH = 0.01  # smallest strength by which ports share a force, relative to the strongest
-FIRST_WIDTH = 1e-6  # width in bond lengths over which the initial bonds of several lists lie
-FIRST_STRIPS = 256  # first strips of each of several lists, in addition to those of one step
-MAX_LIST_STRIPS = 2_000_000  # largest number of strips of all lists, which limits the memory
-STRIP_BYTES = 8 * N_ROWS  # memory of a strip
-LONG_LIST_ADVICE = (
-    'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
-)
 MAX_CYCLES_AT_ONCE = 8
 MAX_STEPS_AT_ONCE = 8000
 # Change of the state between two parts of a march, relative to its size, below which they repeat
@@ -293,7 +284,7 @@ def make_system(
     by_force = responses.motion[:, :, 2 * n + 3 :]
     compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
     points = _make_points(contact, 0 if contact.sets is None else contact.sets.x.size)
-    lists = _make_lists(contact, points, modes is None)
+    lists = _make_lists(contact, points)
 
     state = np.zeros((3, 2 * n))
     if start is not None:
@@ -442,37 +433,13 @@ def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
     return np.hstack([np.zeros((n_rows, 0)), *padded])
 
 
-def _make_lists(contact: Contact, points: Points, is_prescribed: bool) -> BondLists:
-    """Return the arrays of the lists of bonds, which are empty for a contact without lists.
-
-    `contact` has the law and the numbers of the sum over bonds, and `points` the ports, laws and loads of the contact
-    points. `is_prescribed` tells whether the slide of the points is given, and does not follow from forces.
-    """
+def _make_lists(contact: Contact, points: Points) -> BondLists:
+    """Return the lists of bonds of all points, which are empty for a contact without lists."""
     count = points.port.size
     if contact.bond_sum is None:
-        empty = np.zeros(0)
-        return BondLists(
-            np.zeros((N_ROWS, 0)), np.zeros((count, 6)), np.zeros((count, 14)), *[empty] * 3
-        )
-    bonds, reach, merge = contact.bond_sum
-    capacity = list_numbers.estimate_list_capacity(reach, merge)
-    if count > 1:
-        step = list_numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, list_numbers.MAX_DAMAGE))
-        capacity = min(capacity, FIRST_STRIPS + step)
-
-    statuses = list_numbers.make_status(capacity, count)
+        return make_no_lists(count)
     loads = np.where(points.numbers[0] == Law.LIST, points.values[Point.END_LOAD, :count], 0.0)
-    statuses[:, STATUS.pressure] = statuses[:, STATUS.initial_pressure] = loads
-    # The initial bonds of a single list along a prescribed slide have no width, so that it is exact.
-    width = 0.0 if is_prescribed and count == 1 and not points.stiffness.size else FIRST_WIDTH
-    return BondLists(
-        np.zeros((N_ROWS, count * capacity)),
-        np.tile(list_numbers.make_path_state(bonds), (count, 1)),
-        statuses,
-        list_numbers.law_numbers(bonds, reach, merge, width),
-        list_numbers.gamma_table(bonds),
-        growth_numbers(bonds),
-    )
+    return make_lists(*contact.bond_sum, loads)
 
 
 def make_flank(contact: Contact) -> np.ndarray:
@@ -670,18 +637,10 @@ class March:
         self.system = self.system._replace(structure=structure)
 
     def advance(self, count: int) -> np.ndarray:
-        """March over a number of steps; return the samples (steps done + 1, w) of their starts and of the end.
-
-        Raises
-        ------
-        Missing
-            If the lists become too long.
-        """
+        """March over a number of steps; return the samples (steps done + 1, w) of their starts and of the end."""
         self._set_drive(count)
         samples = np.zeros((count + 1, self.width))
-        self.system, n_done, status = march_with_room(
-            self.kernels, self.system, samples, f"after step {self.done}"
-        )
+        n_done, status = self.kernels.march(self.system, count, samples)
         samples = samples[: n_done + 1]
         self.done += n_done
         self._judge(status)
@@ -758,82 +717,15 @@ class March:
             "passed": float(energies[Energy.PASSED]),
         }
         if self.system.options.has_lists:
-            names = ("created", "dissipated", "substeps", "strips")
+            names = ("created", "dissipated", "strips")
             ledger |= dict(zip(names, map(float, self._sum_lists() - self.first_sums)))
         return ledger
 
     def _sum_lists(self) -> np.ndarray:
-        """Return created and dissipated energy [J], extra strips and length of the longest of the lists of bonds."""
-        statuses = self.system.lists.statuses
-        sums = statuses[:, [STATUS.created, STATUS.dissipated, STATUS.n_extra]].sum(axis=0)
-        return np.append(sums, statuses[:, STATUS.max_strips].max(initial=0.0))
-
-
-class MarchedSteps(NamedTuple):
-    """Arrays of a march at its end.
-
-    - system: arrays of the march, which is a copy if lists of bonds were made longer
-    - n_done: number of steps done
-    - status: why the march ended, a status of `march_rows`
-    """
-
-    system: System
-    n_done: int
-    status: int
-
-
-def march_with_room(kernels, system: System, samples, place: str) -> MarchedSteps:
-    """March over steps, again with longer lists of bonds if those are full.
-
-    Parameters
-    ----------
-    kernels : module
-        Compiled march.
-    system : march_rows.System
-        Arrays of the march; changed.
-    samples : (steps + 1, w) array
-        Samples before each step and at the end; output.
-    place : str
-        Where the steps begin, for a message.
-
-    Returns
-    -------
-    MarchedSteps
-
-    Raises
-    ------
-    Missing
-        If the lists become too long.
-    """
-    saved = copy_system(system) if system.options.has_lists else None
-    while True:
-        n_done, status = kernels.march(system, len(samples) - 1, samples)
-        if status != LISTS_FULL:
-            return MarchedSteps(system, n_done, status)
-        saved = enlarge_lists(saved, place)
-        system = copy_system(saved)
-
-
-def enlarge_lists(system: System, place: str) -> System:
-    """Return a copy of a system whose lists of bonds have twice the room; `place` says where, for the message.
-
-    Raises
-    ------
-    Missing
-        If the lists would have more than MAX_LIST_STRIPS strips.
-    """
-    lists = system.lists
-    room = lists.bondlist.shape[1]
-    if room >= MAX_LIST_STRIPS:
-        raise Missing(
-            f"the bond list grew beyond {room} entries ({room * STRIP_BYTES / 1e6:.0f} MB) {place}; "
-            f"{LONG_LIST_ADVICE}",
-            "",
-        )
-    statuses = lists.statuses.copy()
-    capacity = min(2 * room, MAX_LIST_STRIPS) // len(statuses)
-    bondlist = list_numbers.enlarge_lists(lists.bondlist, statuses, capacity)
-    return system._replace(lists=lists._replace(bondlist=bondlist, statuses=statuses))
+        """Return created and dissipated energy [J] of the lists of bonds, and the length of the longest one."""
+        states = self.system.lists.states
+        sums = states[:, [ListState.CREATED, ListState.DISSIPATED]].sum(axis=0)
+        return np.append(sums, states[:, ListState.LARGEST_COUNT].max(initial=0.0))
 
 
 def split_losses(samples, n: int, scale: float) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 
 from .. import compiled
 from ..core import ModalBasis
-from ..friction.bonds.list_rows_kernels import N_ROWS, BondLists
+from ..friction.bonds.list_numbers import make_no_lists
 from ..points import time_march
 from ..points.march_rows import RESULTANT, Flank, Options, Ports, Shear, Structure, System, Total
 from .step_rows_kernels import N_VALUES, WIDTH, Law, Points, Port, Value
@@ -90,9 +90,7 @@ def make_system(
     if start is not None:
         state[0] = [*start.z, *start.v]
     sets = time_march.make_no_sets() if contact.sets is None else contact.sets.make_arrays()
-    no_lists = BondLists(
-        np.zeros((N_ROWS, 0)), np.zeros((0, 6)), np.zeros((0, 14)), *[np.zeros(0)] * 3
-    )
+    no_lists = make_no_lists(0)
     flank = time_march.make_flank(contact)
     totals = np.zeros(len(Total))
     system = System(structure, ports, points, no_lists, flank, sets, state, totals, options)

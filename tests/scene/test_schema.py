@@ -68,7 +68,7 @@ def test_exact_percentage_is_accepted_by_schema_and_program(schema_validator, te
     assert schema_validator.is_valid(tomllib.loads(scene))
     assert loads(scene).structure.mode[0].damping == value
     assert loads(RIG, sets=[f"{key}={text}"]).structure.mode[0].damping == value
-    assert [axis.values for axis in read_assignments([f"{key}={text}, 1 %..2 %:2"])[0]] == [
+    assert [tuple(axis.values) for axis in read_assignments([f"{key}={text}, 1 %..2 %:2"])[0]] == [
         (value, 0.01, 0.02)
     ]
     assert [

@@ -15,13 +15,10 @@ A bond stores the energy that it gives back when its stretch goes to zero withou
 in stored energy. For "report" this may be negative: energy is created.
 
 Read `parameters`, then `point_kernels`: the moments of the bonds, exact for reading="stretch" with p = 1, the default.
-Every other law is a list of strips (`list_rows_kernels`), with one cut-off, one merge and one set of functions
-(`list_kernels`, `list_step_kernels`) for every form of the sum (`list_sum_kernels`). `engines` chooses cut-off and merge
-width by error and cost. A strip is here a piece of the path along which the bonds of a point formed, not a strip of the
-patch.
+Every other law is a list of strips (`strip_rows_kernels`), with one cut-off and one merge (`strip_kernels`). `engines`
+chooses cut-off and merge width by error and cost. A strip is here a piece of the path along which the bonds of a point
+formed, not a strip of the patch.
 
 Numerical errors: `EngineChoice.error` bounds what dropped and joined strips change, and every run adds this bound to
-its errors. The Gauss rules have no bound of their own. Their strips are pieces of the path in a time step, so that the
-runs with half and a quarter of the steps show their error; only increments above MAX_STRIP_LENGTH bond lengths have
-pieces of a fixed length. The sum over the nodes of a patch that slips part by part has the error of its mesh.
+its errors. The sum over the nodes of a patch that slips part by part has the error of its mesh.
 """

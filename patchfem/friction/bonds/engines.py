@@ -1,37 +1,28 @@
 """Choice of the algorithm (engine) that sums eq. 2.17, and of its settings, by the tolerance.
 
-The recursion is exact for reading="stretch" with p = 1. The list of strips (`list_kernels`) sums every law. It has two
+The recursion is exact for reading="stretch" with p = 1. The list of strips (`strip_kernels`) sums every law. It has two
 settings: the fraction of the friction limit that its cut-off may lose, and the width up to which it merges strips. The
-engines `direct`, `truncated` and `merged` use none, the first, and both. Which of them has the shortest list depends on
-the law, the strokes and the steps.
+engines `direct`, `truncated` and `merged` use none, the first, and both.
 """
 
 from dataclasses import dataclass
 from math import inf, sqrt
 from typing import NamedTuple
 
-from .list_numbers import MAX_DAMAGE, cutoff_age, sum_form
-from .list_rows_kernels import FORM_GROWING, FORM_REPORT, MAX_STRIP_LENGTH
+from .list_numbers import MAX_DAMAGE, STRIPS_PER_WIDTH, UNMERGED_WIDTH, cutoff_age
 from .parameters import Bonds
 
-# Settings of a list, by engine: whether it drops old strips, whether it merges strips
-LIST_SETTINGS = {
-    "direct": (False, False),
-    "truncated": (True, False),
-    "merged": (True, True),
-}
-ENGINES = (*LIST_SETTINGS, "recursion")
-# Upper bounds of the error of merging, divided by the square of the merge width (measured by
-# test_merge_bounds)
-MERGE_ERROR_CONSTANT = 0.25  # bound for a constant bond length
-MERGE_ERROR_STRETCH_GROWING = 1.0  # bound for reading="stretch" with growing bonds
-MERGE_ERROR_GROWING = 6.0  # bound for reading="report" with growing bonds
-# Error that merging adds at any merge width for growing bonds with p < 0; it is due to bonds that
-# form at a reversal
-NEGATIVE_ORDER_ERROR = 3e-4
+ENGINES = ("direct", "truncated", "merged", "recursion")
+# Upper bounds of the error of strips, divided by the square of their width (measured by test_merge_bounds): in general, for
+# growing bonds, and for orders between 0 and 1, whose bonds change steeply as they form
+MERGE_ERROR = 0.05
+MERGE_ERROR_GROWING = 0.1
+MERGE_ERROR_STEEP = 0.3
+# Error at any width for an order below 0, due to bonds that form at a reversal
+NEGATIVE_ORDER_ERROR = 3e-3
 # Largest change of the force due to the cut-off, as a fraction of the friction limit
 MAX_TAIL = 1e-6
-MAX_MERGE_WIDTH = 0.02  # largest merge width in bond lengths
+MAX_MERGE_WIDTH = 0.04  # largest merge width in bond lengths
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,72 +113,19 @@ def choose_engine(
     # tolerance, and the cut-off 0.001.
     if tail is None:
         tail = min(1e-3 * tolerance, MAX_TAIL)
-    width = merge
-    if width is None:
-        width = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / _merge_error_factor(law)))
-    choices = {}
-    for name, (drops_strips, merges_strips) in LIST_SETTINGS.items():
-        tail_used = tail * drops_strips
-        choices[name] = _estimate(law, name, tail_used, width * merges_strips, stroke, steps)
+    factor = MERGE_ERROR_GROWING if law.has_growth else MERGE_ERROR
+    if law.order < 1 and law.order != 0:
+        factor = MERGE_ERROR_STEEP
+    if merge is None:
+        merge = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / factor))
+    if engine == "auto":
+        engine = "merged" if merge > 0 else "truncated"
+    tail = 0.0 if engine == "direct" else tail
+    merge = merge if engine == "merged" else 0.0
 
-    # An engine or a merge width that the scene prescribes is used. Otherwise the faster list is, but growing bonds of an
-    # order below 0 have an error that no merge width reduces (NEGATIVE_ORDER_ERROR); if it is too large, none is merged.
-    if engine != "auto":
-        return choices[engine]
-    if merge is not None:
-        return choices["merged" if merge > 0 else "truncated"]
-    if choices["merged"].error > 0.1 * tolerance:
-        return choices["truncated"]
-    return min(choices["truncated"], choices["merged"], key=lambda choice: choice.strips)
-
-
-def _merge_error_factor(law: Bonds) -> float:
-    """Return the bound of the error caused by merging strips, divided by the merge width squared."""
-    if not law.has_growth:
-        return MERGE_ERROR_CONSTANT
-    return MERGE_ERROR_GROWING if law.reading == "report" else MERGE_ERROR_STRETCH_GROWING
-
-
-def _estimate(
-    law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float
-) -> EngineChoice:
-    """Estimate length and error of a bond list with given settings.
-
-    Parameters
-    ----------
-    law : Bonds
-        Parameters of the bonds.
-    name : {"truncated", "merged"}
-        Name of the engine.
-    tail : float
-        Largest fraction of the friction limit that dropped bonds may carry; 0: no bonds are dropped.
-    merge : float
-        Largest width [eps_0] of a joined strip of age 0; 0: no strips are joined.
-    stroke : float
-        Path between two reversals [eps_0].
-    steps : float
-        Number of steps on this path.
-
-    Returns
-    -------
-    EngineChoice
-        With the expected number of strips and the bound of the error.
-    """
-    # Every increment of a step adds a strip, or several if it is longer than a strip may be.
-    form = sum_form(law)
-    increment = stroke / max(steps, 1)
-    reach = min(cutoff_age(law.order, tail) if tail > 0 else MAX_DAMAGE, MAX_DAMAGE)
-    strips = reach / max(increment, 1e-12) * max(1.0, increment / MAX_STRIP_LENGTH)
-    if form == FORM_REPORT:
-        # A strip lasts from reversal to reversal
-        strips = reach / stroke + 2
-    elif form == FORM_GROWING:
-        strips *= 2
-    if merge > 0:
-        # Strips of age R are joined up to merge exp(R/3), but not beyond a reversal
-        strips = min(strips, 5 / merge + 20 + 2 * reach / stroke + 180 * (form == FORM_GROWING))
-
-    error = tail + (_merge_error_factor(law) * merge**2 if merge > 0 else 0.0)
-    if merge > 0 and form == FORM_GROWING and law.order < 0:
-        error += NEGATIVE_ORDER_ERROR
-    return EngineChoice(name, tail, merge, error, strips)
+    # Without merging every increment of a step adds a strip.
+    width = merge or UNMERGED_WIDTH
+    error = tail + factor * width**2 + NEGATIVE_ORDER_ERROR * (law.order < 0)
+    reach = min(cutoff_age(law.order, tail) if tail > 0 else inf, MAX_DAMAGE)
+    strips = STRIPS_PER_WIDTH / merge if merge > 0 else reach * max(steps / stroke, 1 / width)
+    return EngineChoice(engine, tail, merge, error, strips)

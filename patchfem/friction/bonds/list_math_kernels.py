@@ -1,23 +1,13 @@
-"""Exponential, logarithm, power, incomplete gamma function and Gauss rules for the compiled sums over bonds.
+"""Exponential, logarithm and power for the compiled sums over bonds.
 
 `fast_exp` and `fast_log` have no branches: a loop that calls them takes 0.5 ns per exponential and
 1 ns per power.
 """
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss
 
 from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
 from ...compiled.jit import njit
-from .list_rows_kernels import N_TABLE_STEPS
-
-# Number of terms of the series of P(p + 1, x) that are above round-off for x < 1
-N_GAMMA_TERMS = 22
-
-# Gauss rules of the panels of an increment: points in (-1, 1) and weights (2, k)
-MAX_SHORT_PANEL = 0.1  # largest length of a panel with fewer points, in bond lengths
-SHORT_RULE = np.array(leggauss(3))
-LONG_RULE = np.array(leggauss(5))
 
 
 @njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)
@@ -86,50 +76,3 @@ def power(x, p):
     if p == 0.0 or p == 1.0 or p == 2.0:
         return whole_power(x, p)
     return fast_exp(p * fast_log(x))
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def bond_gammainc(p, x, density, inverse_gamma, table):
-    """Return P(p + 1, x), the fraction of the limit that bonds of the last x bond lengths carry.
-
-    It has a closed form for p = 0, 1 and 2. Else it is a power series for x < 1, and above it a cubic between two
-    entries of a table, with the slopes x^p exp(-x)/Gamma(p + 1); its error is below 1e-12.
-
-    Parameters
-    ----------
-    p, x : float
-        Order p > -1 and argument x >= 0, the path in bond lengths.
-    density, inverse_gamma : float
-        x^(p + 1) exp(-x)/Gamma(p + 1), 1/Gamma(p + 1).
-    table : (k,) array
-        P(p + 1, x) at multiples of 1/N_TABLE_STEPS (`list_numbers.gamma_table`).
-
-    Returns
-    -------
-    float
-    """
-    if p == 0.0 or p == 1.0 or p == 2.0:
-        return 1 - (1 + min(p, 1.0) * x * (1 + max(p - 1, 0.0) * 0.5 * x)) * fast_exp(-x)
-    if x < 1:
-        # P(a, x) = x^a exp(-x)/Gamma(a + 1) (1 + x/(a + 1) + x^2/((a + 1)(a + 2)) + ...), a = p + 1
-        term = density / (p + 1)
-        total = term
-        for n in range(1, N_GAMMA_TERMS):
-            term *= x / (p + 1 + n)
-            total += term
-        return total
-    index = int(min(x * N_TABLE_STEPS, 1.0 * table.size))
-    if index + 1 >= table.size:
-        return 1.0
-
-    # Hermite's cubic between two entries
-    width = 1.0 / N_TABLE_STEPS
-    low = index * width
-    high = low + width
-    slope_low = inverse_gamma * width * fast_exp(p * fast_log(low) - low)
-    slope_high = inverse_gamma * width * fast_exp(p * fast_log(high) - high)
-    change = table[index + 1] - table[index]
-    t = x * N_TABLE_STEPS - index
-    cubic = slope_low + slope_high - 2 * change
-    square = 3 * change - 2 * slope_low - slope_high
-    return table[index] + t * (slope_low + t * (square + t * cubic))

@@ -6,8 +6,6 @@ import numpy as np
 
 CONSTANT_LENGTH_FLAG = -1.0  # value in place of a_s that marks a constant bond length
 MAX_LIST_SECONDS = 600.0  # largest estimated CPU time [s] of a run with a list of bonds
-# The same for a block that the printed law holds at rest. Its run is refused earlier, as it shows only that the block rests.
-MAX_STUCK_LIST_SECONDS = 60.0
 
 
 @dataclass(frozen=True, slots=True)

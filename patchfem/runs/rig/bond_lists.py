@@ -1,11 +1,6 @@
 """Method of bond summation for a rig, and the limits of its bond list.
 
 In: a Model and its Numerics. Out: the EngineChoice of the bond summation (`choose_bond_summation`),
-and whether a longer list of bonds is worth its time.
-
-A law without stiffness (the law as printed, or order 0) holds a block by a reversal in almost every
-time step. Each reversal adds a strip to the list, so that the cost increases with the square of the
-number of steps (`refuse_long_stick`). `bench.engine.BondListGuard` stops other runs that take too long.
 """
 
 from functools import lru_cache
@@ -13,17 +8,12 @@ from math import ceil, inf, pi, sqrt
 
 import numpy as np
 
-from ... import cost_model
 from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines
-from ...friction.bonds.list_numbers import sum_form
-from ...friction.bonds.list_rows_kernels import FORM_GROWING
-from ...friction.bonds.parameters import MAX_STUCK_LIST_SECONDS
 from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ..bench import engine as bench_engine
-from .costs import MARCH_COST_FACTOR
 from .numerics import Numerics
 
 # Ratio of the stroke that bond summation has to resolve to the first stroke of a released motion.
@@ -34,12 +24,6 @@ STICKING_STROKE_RATIO = 1e-4
 # Smallest ratio of friction limit to drive force (D) at which a block counts as stuck. Above it 0.6
 # or more strips remain per step, compared with 0.06 at D = 1.06 and 0.28 at D = 1.4.
 MIN_STUCK_FORCE_RATIO = 2.0
-# Largest number of strips per step at which shorter steps are useful. With more strips the motion
-# reverses every few steps, and shorter steps only lengthen the list.
-MAX_LISTED_STRIPS_PER_STEP = 0.1
-# Largest number of strips, at about one per step, at which steps are halved again; each halving
-# makes the run four times as expensive.
-MAX_HALVED_STRIPS = 500
 # Largest phase [rad] per step of the vibration of the block on its bonds.
 MAX_BOND_VIBRATION_PHASE = 2.0
 
@@ -129,26 +113,6 @@ def is_stuck_by_printed_law(model: Model) -> bool:
     )
 
 
-def refuse_long_stick(model: Model, numerics: Numerics, n_lists: int) -> None:
-    """Raise Missing if a block that the printed law holds at rest takes more than MAX_STUCK_LIST_SECONDS of CPU time.
-
-    Every step adds a strip of bonds to each of its lists, and sums over all strips.
-
-    Parameters
-    ----------
-    model : Model
-        Model with bonds.
-    numerics : Numerics
-        Cycles and steps per cycle of the run.
-    n_lists : int
-        Number of lists: 1, or that of the nodes if the pressure changes.
-    """
-    if is_stuck_by_printed_law(model) and has_bond_list(model, numerics):
-        steps = numerics.cycles * numerics.steps
-        seconds = cost_model.LIST_STRIP_STEP_SECONDS * n_lists * steps**2 / 2
-        bench_engine.refuse_slow_list(MARCH_COST_FACTOR * seconds, MAX_STUCK_LIST_SECONDS)
-
-
 def compute_holding_force(rig) -> float:
     """Return the peak force [N] on the first interface that holds all interfaces at rest.
 
@@ -174,29 +138,6 @@ def compute_holding_force(rig) -> float:
         return float(abs(np.linalg.solve(whole, np.append(push, np.zeros(len(interfaces))))[n]))
     except np.linalg.LinAlgError:
         return inf
-
-
-def is_bond_list_too_long(model: Model, numerics: Numerics, counters) -> bool:
-    """Return whether the bond list is too long to halve the time step once more.
-
-    This is the case if it gets a strip every few steps. Bonds that grow leave a strip in each step
-    of any motion; for these, the block must be held as well.
-
-    Parameters
-    ----------
-    model : Model
-        Model with bonds.
-    numerics : Numerics
-        Cycles and steps per cycle of the run.
-    counters : dict
-        Counters of the run, including "strips".
-    """
-    strips = counters.get("strips", 0.0)
-    if strips <= MAX_HALVED_STRIPS or model.bonds.reading != "report":
-        return False
-    if sum_form(model.bonds) == FORM_GROWING:
-        return is_stuck_by_printed_law(model)
-    return strips > MAX_LISTED_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 
 
 def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:

@@ -17,7 +17,7 @@ from ...response.measures import Values, compute_step_harmonic, peak_sampling_er
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ..bench.engine import BondListGuard
 from . import bands
-from .bond_lists import choose_bond_summation, has_bond_list, refuse_long_stick
+from .bond_lists import choose_bond_summation, has_bond_list
 from .contact_points import make_contact
 from .evaluation import RunEvaluator, compute_work_check
 from .solution import Fields, Solution, compute_sampled_loop, describe_escape, find_travel
@@ -42,8 +42,6 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     begin = process_time()
     contact = make_contact(model, numerics, patch)
     reduced = process_time() - begin
-    n_lists = sum(point_set.law.numbers[0].size for point_set in contact.point_sets)
-    refuse_long_stick(model, numerics, n_lists)
     engine.load_kernels(contact, say)
     prepare = {"reduce": reduced, "compiled_code": process_time() - begin - reduced}
     progress = BondListGuard(progress) if has_bond_list(model, numerics) else progress

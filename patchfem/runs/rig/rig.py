@@ -336,7 +336,6 @@ def _count_finer_passes(run: CoupledRun) -> int:
     if (
         not ENGINES[numerics.engine].has_steps
         or run.model.accuracy.steps_per_cycle is not None
-        or bond_lists.is_bond_list_too_long(run.model, numerics, run.solution.book)
         or run.solution.outcome in EARLY_OUTCOMES
     ):
         return 0

@@ -49,7 +49,6 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     ),
     "points.time_march.MAX_LIST_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
-    "friction.bonds.parameters.MAX_STUCK_LIST_SECONDS": "the same of a block that the law as printed holds at rest [s]",
     "hybrid.cases.MAX_STEPS": "steps of a motion from event to event, with method `exact` or by engine `hybrid`, beside "
     "100 in each cycle",
     "structure.drive_sizes.MAX_STORED_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
