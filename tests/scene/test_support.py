@@ -39,6 +39,7 @@ SETS = {
     "law for flat faces": IWAN,
     "law for one interface": "{law}.law=convolution {law}.bond_length=1_um",
     "law for rigid pieces": IWAN,
+    "law without parallel elements": IWAN,
     "law of an averaged pressure": "{law}.law=convolution {law}.bond_length=1_um",
     "law that sticks rigidly": "{law}.law=coulomb",
     "memory of the slip": BONDS,

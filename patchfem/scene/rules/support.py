@@ -216,6 +216,9 @@ LAW_FEATURES = {
     "law for rigid pieces": lambda j: (
         not j.is_interface and not j.has_trait("bonds") and j.lacks("shear")
     ),
+    "law without parallel elements": lambda j: (
+        not j.has_trait("bonds") and (j.lacks("pieces") or j.lacks("shear"))
+    ),
     "law for one interface": lambda j: j.lacks("joints"),
     "law for flat faces": lambda j: not j.needs_list and j.lacks("grooves"),
     "law without bonds": lambda j: not j.has_trait("bonds"),
