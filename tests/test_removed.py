@@ -245,9 +245,9 @@ def test_always_all_removed_features_are_tested():
 
 
 def test_always_removing_versions_are_releases():
-    """Each version that removed a key, files or an option is a release that the list of changes contains."""
+    """Each version that removed a key, files or an option is a release, or a pre-release, that the list of changes contains."""
     changes = (Path(pf.__file__).parent / "CHANGES.md").read_text("utf-8")
-    releases = set(re.findall(r"^## (\d+\.\d+)\.0 \(", changes, re.MULTILINE))
+    releases = set(re.findall(r"^## (\d+\.\d+)\.0(?:a\d+)? \(", changes, re.MULTILINE))
     assert {version for version, _ in removed.read_removed_names().values()} <= releases
 
 

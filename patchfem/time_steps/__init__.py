@@ -26,8 +26,19 @@ it writes nothing but `trial` and the outputs. After an accepted step the march 
 step of duration 0 is a change of load at rest, and with equal loads it reads a state. What a change of the load does is a
 part of the law: half of it acts before the slide, half after it, and no law creates energy: MEAN * SLIDE is at least the
 change of ENERGY.
-
-A law with a state of another form (a list of bonds) takes its arrays as a last argument, `lists`, with an entry for each
-block and point (`block`, the number of the block, stands before it). A second function with the same arguments,
-`commit_list(numbers, memory, trial, values, count, step, block, lists)`, advances this state over an accepted step.
 """
+
+# Names that other folders use, by module
+PUBLIC = {
+    "contacts": ("Contact", "PointSet"),
+    "laws": (
+        "STIFF_LAWS",
+        "PointLaw",
+        "make_cells",
+        "make_cubic",
+        "make_elements",
+        "make_interlocking",
+        "make_point_law",
+    ),
+    "systems": ("find_stiffness",),
+}
