@@ -245,7 +245,7 @@ def test_always_all_removed_features_are_tested():
 
 
 def test_always_removing_versions_are_releases():
-    """Each version that removed a key, files or an option is a release, or a pre-release, that the list of changes contains."""
+    """Each version that removed a key, files or an option is a release or pre-release in the list of changes."""
     changes = (Path(pf.__file__).parent / "CHANGES.md").read_text("utf-8")
     releases = set(re.findall(r"^## (\d+\.\d+)\.0(?:a\d+)? \(", changes, re.MULTILINE))
     assert {version for version, _ in removed.read_removed_names().values()} <= releases

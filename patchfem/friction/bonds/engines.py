@@ -71,6 +71,26 @@ class RequestedEngine(NamedTuple):
     merge: float | None = None
 
 
+def find_error_factor(law: Bonds) -> float:
+    """Return the bound of the error of strips / (friction limit * width^2), with their width in bond lengths."""
+    if law.order < 1 and law.order != 0:
+        return MERGE_ERROR_STEEP
+    return MERGE_ERROR_GROWING if law.has_growth else MERGE_ERROR
+
+
+def estimate_strip_error(law: Bonds, width: float) -> float:
+    """Return a bound of the error of the sum over strips, relative to the friction limit.
+
+    Parameters
+    ----------
+    law : Bonds
+        Parameters of the bonds.
+    width : float
+        Largest width of a strip [bond lengths].
+    """
+    return find_error_factor(law) * width**2 + NEGATIVE_ORDER_ERROR * (law.order < 0)
+
+
 def choose_engine(
     law: Bonds,
     tolerance: float,
@@ -113,11 +133,8 @@ def choose_engine(
     # tolerance, and the cut-off 0.001.
     if tail is None:
         tail = min(1e-3 * tolerance, MAX_TAIL)
-    factor = MERGE_ERROR_GROWING if law.has_growth else MERGE_ERROR
-    if law.order < 1 and law.order != 0:
-        factor = MERGE_ERROR_STEEP
     if merge is None:
-        merge = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / factor))
+        merge = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / find_error_factor(law)))
     if engine == "auto":
         engine = "merged" if merge > 0 else "truncated"
     tail = 0.0 if engine == "direct" else tail
@@ -125,7 +142,7 @@ def choose_engine(
 
     # Without merging every increment of a step adds a strip.
     width = merge or UNMERGED_WIDTH
-    error = tail + factor * width**2 + NEGATIVE_ORDER_ERROR * (law.order < 0)
+    error = tail + estimate_strip_error(law, width)
     reach = min(cutoff_age(law.order, tail) if tail > 0 else inf, MAX_DAMAGE)
     strips = STRIPS_PER_WIDTH / merge if merge > 0 else reach * max(steps / stroke, 1 / width)
     return EngineChoice(engine, tail, merge, error, strips)

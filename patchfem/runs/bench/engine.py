@@ -146,7 +146,8 @@ def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | N
     choice = choose_bond_summation(model, slide)
     if choice.engine != "merged":
         return choice
-    return replace(choice, engine="truncated", merge=0.0, error=choice.tail)
+    strip_error = bond_engines.estimate_strip_error(model.bonds, bond_engines.UNMERGED_WIDTH)
+    return replace(choice, engine="truncated", merge=0.0, error=choice.tail + strip_error)
 
 
 def mean_stroke(slide) -> tuple[float, float]:

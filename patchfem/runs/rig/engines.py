@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import hybrid, slip
+from ... import friction, hybrid, slip
 from ...convergence import ERROR_SAFETY_FACTOR
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
@@ -205,7 +205,13 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
         passed = np.abs(np.diff(window.extra["ledger"][0])).sum()
         span = max(window.time[-1] - window.time[0], 1e-300)
         works = solution.book["passed"], passed * model.rig.drive.signal.period / span
-        return friction_errors(values, choice.error, model.friction, load, works)
+
+        # Strips of a full list are wider than those of the choice.
+        forced = friction.bonds.engines.estimate_strip_error(
+            model.bonds, solution.book["forced_width"]
+        )
+        error = max(choice.error, forced)
+        return friction_errors(values, error, model.friction, load, works)
 
     # The change of the motion adds to the bound where strips or the tail are coarse.
     coarser_runs = [CoarserRuns((), bound_errors, source="bonds")]

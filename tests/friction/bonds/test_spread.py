@@ -45,16 +45,15 @@ def test_exact_bench_forces_scale_with_spread_factor(law):
     assert reduced.slip == pytest.approx(full.slip, rel=1e-9, abs=1e-18)
 
 
-def test_exact_strips_use_spread_of_full_width():
-    """A contact in four strips has the spread factor of the full width."""
-    strip_sets = ["contact.strips.count=4"]
-    single_strip, four_strips = (
+def test_exact_face_uses_spread_of_full_width():
+    """A contact over a face has the spread factor of the full width."""
+    plane, face = (
         build(loads(SMALL_PATCH + NONLOCAL_2UM + TRIANGLE, sets=SPREAD + extra_sets)).friction
-        for extra_sets in ([], strip_sets)
+        for extra_sets in ([], ["contact.area.cells=64"])
     )
     assert (
-        single_strip.static
-        == four_strips.static
+        plane.static
+        == face.static
         == pytest.approx(0.3 * carried_fraction(12.7e-3, 4e-3), rel=1e-15)
     )
 
