@@ -16,9 +16,14 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[2]
 TEMPLATES = ROOT / "patchfem/scene/templates"
-# Scenes that call every function that a shipped scene calls: the engine from event to event, both marches and their
-# histories, and the loop over the cases of a sweep.
-RUNS = (TEMPLATES / "joint.toml", TEMPLATES / "rig.toml", ROOT / "studies/rig/report.toml")
+# Scenes that call every function that a shipped scene calls: the engine from event to event, the marches of points and of
+# lists of bonds and their histories, and the loop over the cases of a sweep.
+RUNS = (
+    TEMPLATES / "joint.toml",
+    TEMPLATES / "rig.toml",
+    ROOT / "studies/rig/rig.toml",
+    ROOT / "studies/rig/report.toml",
+)
 SWEEP = TEMPLATES / "rig.toml", {"drive.acceleration": "3 g..6 g:64"}
 
 
