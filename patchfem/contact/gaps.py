@@ -47,10 +47,23 @@ SHAPE_PROPERTIES = {
 def tilt(
     x: np.ndarray, angle: float, roll: float | None = None, y: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Return the gap [m] of a tilted upper piece: the angle times x, plus the angle `roll` times y.
+    """Return the gap of a tilted upper piece: the angle times x, plus the angle `roll` times y.
 
-    An angle [rad] > 0 opens the gap at +x, and a roll > 0 at +y. The positions x and y [m] broadcast; y is 0 in a plane
-    patch.
+    Parameters
+    ----------
+    x : (m,) or (1, nx) ndarray
+        Positions along the sliding direction [m].
+    angle : float
+        Rotation about y [rad]; a positive one opens the gap at +x.
+    roll : float, optional
+        Rotation about x [rad]; a positive one opens the gap at +y.
+    y : (ny, 1) ndarray or float
+        Positions across the sliding direction [m], which broadcast with x; 0 in a plane patch.
+
+    Returns
+    -------
+    (m,) or (ny, nx) ndarray
+        Gap [m].
     """
     return angle * x if roll is None else angle * x + roll * y
 
@@ -58,10 +71,23 @@ def tilt(
 def crown(
     x: np.ndarray, radius: float, across: float | None = None, y: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Return the gap [m] of a crowned piece on a flat one: x^2/(2 radius) + y^2/(2 across).
+    """Return the gap of a crowned piece on a flat one: x^2/(2 radius) + y^2/(2 across).
 
-    Both radii are > 0 [m]; without `across` the crown is flat along y. The positions x and y [m] broadcast; y is 0 in a
-    plane patch.
+    Parameters
+    ----------
+    x : (m,) or (1, nx) ndarray
+        Positions along the sliding direction [m].
+    radius : float
+        Radius of the crown along x [m], > 0.
+    across : float, optional
+        Radius of the crown along y [m], > 0; None for a crown that is flat along y.
+    y : (ny, 1) ndarray or float
+        Positions across the sliding direction [m], which broadcast with x; 0 in a plane patch.
+
+    Returns
+    -------
+    (m,) or (ny, nx) ndarray
+        Gap [m].
     """
     along = x**2 / (2 * radius)
     return along if across is None else along + y**2 / (2 * across)

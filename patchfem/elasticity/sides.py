@@ -277,14 +277,12 @@ class _Quarter:
         for a, b in np.ndindex(3, 3):
             terms = ((0, a, b, a, b), (1, a, b, b, a), (1, a, a, b, b))
             for modulus, test, trial, test_axis, trial_axis in terms:
-                x_part, y_part = (
-                    functions[test].integrate(
-                        functions[trial], test_axis == axis, trial_axis == axis
-                    )
-                    for axis, functions in enumerate((along_x, along_y))
-                )
+                parts = []
+                for axis, functions in enumerate((along_x, along_y)):
+                    slopes = test_axis == axis, trial_axis == axis
+                    parts.append(functions[test].integrate(functions[trial], *slopes))
                 slot = (modulus, int(test_axis == 2), int(trial_axis == 2), test, trial)
-                blocks[slot] = blocks[slot] + np.kron(x_part, y_part)
+                blocks[slot] = blocks[slot] + np.kron(*parts)
         sizes = [n_x * n_y for n_x, n_y in self.shapes]
         out = np.zeros((2, 2, 2, sum(sizes), sum(sizes)))
         starts = np.cumsum([0, *sizes])
@@ -335,10 +333,8 @@ class _Quarter:
         ends = np.repeat(self.depths[sheet : sheet + 2], ORDER + 1)
         functions = _evaluate(BSpline(ends, np.eye(ORDER + 1), ORDER))
         factors = np.tensordot(self.moduli[sheet], in_plane, 1)
-        return sum(
-            np.kron(functions.integrate(functions, test, trial), factors[test, trial])
-            for test, trial in np.ndindex(2, 2)
-        )
+        slopes = np.ndindex(2, 2)
+        return sum(np.kron(functions.integrate(functions, *pair), factors[pair]) for pair in slopes)
 
 
 class _Functions(NamedTuple):
@@ -352,7 +348,20 @@ class _Functions(NamedTuple):
     weights: np.ndarray
 
     def integrate(self, other: "_Functions", slope: int, other_slope: int) -> np.ndarray:
-        """Return the integrals (n, n') of products of functions with others, or of their slopes where these are 1."""
+        """Integrate the products of the functions, or of their slopes, with other functions or their slopes.
+
+        Parameters
+        ----------
+        other : _Functions
+            n' functions at the same points.
+        slope, other_slope : int
+            Whether the slopes [1/m] of the functions and of the others are taken (1) or their values (0).
+
+        Returns
+        -------
+        (n, n') ndarray
+            Integrals [m] of values, divided by m for each slope.
+        """
         weighted = self.values[int(slope)] * self.weights[:, None]
         return weighted.T @ other.values[int(other_slope)]
 

@@ -111,14 +111,11 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
         elif _is_nonzero(measures, name):
             part = text.format(_format_measure(name, measures))
             patch_model = result.plan.model.patch
-            if (
-                name == "contact_fraction"
-                and patch_model is not None
-                and patch_model.area is not None
-            ):
-                part = part.replace("of the length", "of the face")
-            if (kind, name) == ("patch", "contact_fraction"):
-                part += _describe_place(details.get("contact"), " ({})")
+            if name == "contact_fraction":
+                if patch_model is not None and patch_model.area is not None:
+                    part = part.replace("of the length", "of the face")
+                if kind == "patch":
+                    part += _describe_place(details.get("contact"), " ({})")
             if name == "worn_depth_max" and result.plan.model.patch.gap.is_split:
                 part += " of the mean over the short waves"
             parts.append(part)

@@ -118,8 +118,8 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
         )
 
     # One row of points beyond each side stays, if there is one.
-    columns = _points_over(x, length)
-    rows = _points_over(y, width)
+    columns = _find_covering(x, length)
+    rows = _find_covering(y, width)
     part = Areal(
         frozen_array(x[columns]),
         frozen_array(y[rows]),
@@ -147,7 +147,7 @@ def _covered_length(places: np.ndarray, length: float) -> float:
     return max(last - first, 0.0)
 
 
-def _points_over(places: np.ndarray, length: float) -> slice:
+def _find_covering(places: np.ndarray, length: float) -> slice:
     """Return the slice of the points at `places` (n,) [m] that cover a face of a length [m] about 0."""
     first = max(int(np.searchsorted(places, -length / 2, "right")) - 1, 0)
     last = int(np.searchsorted(places, length / 2, "left")) + 1

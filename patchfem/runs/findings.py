@@ -268,7 +268,8 @@ def _advise_steps(missed: Missed) -> Advice | None:
     """Return the advice that reduces the error of the time steps; None for an engine without equal steps.
 
     The error falls with the square of the step. If the scene fixes the engine or the steps of a rig, and they are far
-    too few, the advice is to leave out these keys; otherwise it is a larger number of steps per cycle.
+    too few, or so few that the error is as large as the value, the advice is to leave out these keys; otherwise it is a
+    larger number of steps per cycle.
     """
     steps = missed.result.settings.steps_per_cycle
     if steps is None:
@@ -282,7 +283,9 @@ def _advise_steps(missed: Missed) -> Advice | None:
     )
     if model.accuracy.steps_per_cycle is not None:
         fixed.append("steps_per_cycle")
-    if model.kind == "rig" and fixed and halvings > MAX_FIXED_STEP_HALVINGS:
+    worst = missed.measures[missed.worst]
+    is_unresolved = halvings > MAX_FIXED_STEP_HALVINGS or worst.error >= abs(worst.value)
+    if model.kind == "rig" and fixed and is_unresolved:
         keys = " and ".join(f"accuracy.{key}" for key in fixed)
         return Advice(f"leave out {keys}; the steps then follow from the tolerance", keys)
     return Advice.set_key(

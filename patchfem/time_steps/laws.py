@@ -149,9 +149,23 @@ def make_elements(stiffness, yields) -> PointLaw:
     return make_cells(np.multiply(stiffness, yields), np.asarray(yields, float), 1.0)
 
 
-def make_iwan(law, load) -> PointLaw:
-    """Return points of an Iwan model (`friction.laws.iwan.Iwan`) under a load [N]."""
-    cells = slider_cells(law.static, law.stiffness, law.chi, law.beta, N_CELLS)
+def make_iwan(law, load, n_cells: int = N_CELLS) -> PointLaw:
+    """Return points of an Iwan model (`friction.laws.iwan.Iwan`) under a load.
+
+    Parameters
+    ----------
+    law : Iwan
+        Law per newton of load.
+    load : float or (m,) array
+        Normal load [N].
+    n_cells : int
+        Number of cells into which the model is divided.
+
+    Returns
+    -------
+    PointLaw
+    """
+    cells = slider_cells(law.static, law.stiffness, law.chi, law.beta, n_cells)
     forces = cells.stiffness * cells.yield_displacement
     count = -(-forces.size // VECTOR) * VECTOR
     weights = np.zeros(count)
@@ -191,7 +205,21 @@ def make_bouc_wen(law, load) -> PointLaw:
 
 
 def make_tanh(law, load, compliance=0.0) -> PointLaw:
-    """Return points of the regularised law (`friction.laws.tanh.Tanh`) under a load [N] behind a compliance [m/N]."""
+    """Return points of the regularised law (`friction.laws.tanh.TanhLaw`) under a load.
+
+    Parameters
+    ----------
+    law : TanhLaw
+        Law per newton of load.
+    load : float or (m,) array
+        Normal load [N].
+    compliance : float or (m,) array
+        Compliance [m/N] in series with a point; 0 for none.
+
+    Returns
+    -------
+    PointLaw
+    """
     load = np.asarray(load, float)
     if np.any(compliance):
         # In a series of both, the spring limits the force of fast motions.
@@ -206,9 +234,21 @@ def make_tanh(law, load, compliance=0.0) -> PointLaw:
 
 
 def make_coulomb(law, load, compliance=0.0) -> PointLaw:
-    """Return points of Coulomb's law under a load [N].
+    """Return points of Coulomb's law under a load.
 
-    A compliance [m/N] of a point makes it elastic-plastic, with a stiffness that does not follow the load.
+    Parameters
+    ----------
+    law : Coulomb
+        Law per newton of load.
+    load : float or (m,) array
+        Normal load [N].
+    compliance : float or (m,) array
+        Compliance [m/N] in series with a point, which makes it elastic-plastic, with a stiffness that does not follow the
+        load; 0 for a rigid point.
+
+    Returns
+    -------
+    PointLaw
     """
     if np.any(compliance):
         # The stiffness 1/compliance is that of the springs of a reference load, also at points that have no load yet.

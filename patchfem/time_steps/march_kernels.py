@@ -287,7 +287,8 @@ def move_rigid_port(system, level, p, block):
         # The motion is prescribed.
         return limit * np.sign(moves[Port.INCREMENT, p])
 
-    first = moves[Port.VELOCITY, p]
+    # 0 for a port at rest, whose state has a velocity of round-off, which would hide its static friction
+    first = values[Value.START_VELOCITY]
     change = moves[Port.END_VELOCITY, p] - first + mobility * moves[Port.FORCE, p]
     direction = np.sign(first)
     if first == 0.0:

@@ -153,9 +153,8 @@ def _find_redundant(rows, contact) -> np.ndarray:
     count, n = rows.shape
     redundant = np.zeros(count)
     is_rigid = np.zeros(count, bool)
-    is_rigid[: len(contact.point_sets)] = [
-        point_set.law.law == Law.COULOMB for point_set in contact.point_sets
-    ]
+    laws = [point_set.law.law for point_set in contact.point_sets]
+    is_rigid[: len(laws)] = [law == Law.COULOMB for law in laws]
     if is_rigid.sum() <= n:
         return redundant
     limits = [point_set.law.limits.sum() for point_set in contact.point_sets]

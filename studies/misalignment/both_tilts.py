@@ -48,7 +48,20 @@ TITLES = {
 
 
 def run_case(angle: float, roll: float, cells: int = CELLS) -> dict:
-    """Return contact [1], stiffness [N/m] and work of a cycle [J] with a tilt and a roll [mrad]."""
+    """Run the contact with a tilt and a roll.
+
+    Parameters
+    ----------
+    angle, roll : float
+        Tilt about y and roll about x [mrad].
+    cells : int
+        Number of cells along each side of the face.
+
+    Returns
+    -------
+    dict of str to float
+        Fraction of the face in "contact" [1], "stiffness" in shear [N/m] and "work" of a cycle [J].
+    """
     tilt = {"angle": f"{angle} mrad", "roll": f"{roll} mrad"}
     contact = SCENE["contact"] | {"tilt": tilt, "area": {"cells": cells}}
     result = pf.run(SCENE | {"contact": contact})
@@ -70,7 +83,22 @@ def run_map(angles=ANGLES, cells: int = CELLS) -> dict:
 
 
 def draw(maps: dict, path: Path, angles=ANGLES) -> Path:
-    """Draw the maps of contact, stiffness and work, and return the path of the picture."""
+    """Draw the maps of contact, stiffness and work.
+
+    Parameters
+    ----------
+    maps : dict of str to (k, k) ndarray
+        Maps over tilt (rows) and roll (columns): "contact" [1], "stiffness" [N/m] and "work" [J].
+    path : Path
+        File of the picture.
+    angles : sequence of float
+        The k tilts and rolls [mrad].
+
+    Returns
+    -------
+    Path
+        File of the picture.
+    """
     scale = {"contact": 100.0, "stiffness": 1e-6, "work": 1e6}
     with drawing(path, (9.6, 3.4), 1, 3, sharey=True) as (_, panels):
         for axis, (name, title) in zip(panels, TITLES.items(), strict=True):

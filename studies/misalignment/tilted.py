@@ -14,7 +14,7 @@ from patchfem.mesh import Layout, TensorGrid, divide_into_columns, divide_into_r
 from patchfem.model import build
 from patchfem.model.patch import PatchModel
 from patchfem.runs.patch.condensed import CondensedPair, condense
-from patchfem.runs.patch.measures import estimate_static_measures
+from patchfem.runs.patch.measures import with_static_measures
 from patchfem.runs.patch.press import Patch, solve_patch_contact
 from patchfem.scene import scene
 
@@ -75,8 +75,8 @@ def patches(asked: PatchModel) -> tuple:
 
 def compute_measures(asked: PatchModel) -> dict:
     """Return {name: Measure} of a model of `case`, with `rubbed`, the portion that rubs, as a value."""
-    three = patches(asked)
-    return estimate_static_measures(*three) | {"rubbed": rubbed_portion(three[0])}
+    fine = with_static_measures(patches(asked), None)[0]
+    return fine.measures | {"rubbed": rubbed_portion(fine)}
 
 
 def rubbed_portion(patch: Patch) -> float:

@@ -85,6 +85,7 @@ def make_coulomb_contact(grooves, tolerance, compliance=COMPLIANCE):
     """Return points on flanks with Coulomb friction."""
     bodies = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
     patch = SimpleNamespace(
+        model=SimpleNamespace(area=None),
         pressure=SimpleNamespace(sigma_n=LOAD * LOAD_FRACTION),
         pieces=bodies,
         slip_compliance=compliance,

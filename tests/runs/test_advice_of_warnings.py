@@ -19,7 +19,7 @@ import patchfem
 from patchfem import run
 from patchfem.scene import choose_law, compose_scene
 
-# Random scenes with few steps, elements or strips or a tight tolerance, whose warnings advise to set or to leave
+# Random scenes with few steps or elements or a tight tolerance, whose warnings advise to set or to leave
 # out a key (drawn by `support/remedies.py` of version 1.11).
 WARNED = read_json(Path(__file__).parent / "found/warned_scenes.json")
 ADVICE = re.compile(
@@ -82,12 +82,13 @@ def test_error_without_order_of_convergence_meets_tolerance_with_proposed_steps(
 
 
 def test_always_unresolved_free_vibration_is_solved_without_prescribed_steps():
-    """Steps of 1/800 cycle are too large for a free vibration with 88 periods per cycle. The
+    """Steps of 1/200 cycle are too large for a free vibration with 88 periods per cycle. A
     warning advises to leave out method and steps, which reduces the error at least tenfold."""
     loose = "[accuracy]\ntolerance = 0.3\n"
     marched = run(JOINT_SHAKEN + loose + 'method = "march"\nsteps_per_cycle = 200\n')
     advice = "leave out accuracy.method and accuracy.steps_per_cycle"
-    assert marched.settings.engine == "march" and advice in marched.warnings[0]
+    assert marched.settings.engine == "march"
+    assert any(advice in warning for warning in marched.warnings)
     exact = run(JOINT_SHAKEN + loose)
     errors = [result.measures["equivalent_damping"].error for result in (marched, exact)]
     assert errors[1] < errors[0] / 10

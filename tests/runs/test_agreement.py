@@ -147,11 +147,11 @@ PAIRS = {
     ),
     "truncated bonds": (
         BOND_SUM, "friction.order=0.5; accuracy.steps_per_cycle=120", "accuracy.quadrature=truncated; accuracy.tail=0.05",
-        "accuracy.quadrature=truncated; accuracy.tail=1e-9", MAIN, "march march", 1.5,
+        "accuracy.quadrature=truncated; accuracy.tail=1e-9", MAIN, "march march", 1.6,
     ),
     "merged bonds": (
         BOND_SUM, "friction.reading=report; friction.initial_bonds=0; accuracy.steps_per_cycle=120; " + GROWING,
-        "accuracy.merge=0.3", "accuracy.quadrature=truncated; accuracy.tail=1e-9", MAIN, "march march", 1e-6,
+        "accuracy.merge=0.3", "accuracy.quadrature=truncated; accuracy.tail=1e-9", MAIN, "march march", 3e-4,
     ),
     "part of a long run": (
         SOFT_BONDS, "structure.mode.axial.damping=0.05", "drive.cycles=300", "drive.cycles=300.5", MAIN,

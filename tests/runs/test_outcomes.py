@@ -298,7 +298,8 @@ ENGINES = [  # Scene, changes and the engine that a plan chooses.
     (POINT + PLASTIC + SLIDE, "", "bench, parallel elements"),
     (POINT + NONLOCAL + SLIDE, "", "bench, recursion"),
     (POINT + NONLOCAL + SLIDE, "friction.order=2", "bench, merged bond list"),
-    (POINT + NONLOCAL + SLIDE, "friction.reading=report", "bench, truncated bond list"),
+    (POINT + NONLOCAL + SLIDE, "friction.reading=report", "bench, merged bond list"),
+    (POINT + NONLOCAL + SLIDE, "accuracy.quadrature=truncated", "bench, truncated bond list"),
     (TILTED + NONLOCAL + SLIDE, "contact.tilt.on=lower", "bench, recursion"),
     (TILTED + NONLOCAL + SLIDE, "contact.shear={}", "bench, bond points"),
 ]  # fmt: skip

@@ -15,7 +15,7 @@ def test_exact_errors_of_levels_include_mesh_error():
     """
     # Without further passes, which depend on the speed of the machine.
     text = (
-        "[accuracy]\nmax_seconds = 1\n"
+        "[accuracy]\nmax_seconds = 0.001\n"
         '[contact]\nlength = "40 mm"\nwidth = "30 mm"\nheight = "10 mm"\nload = "6 kN"\nsubstrate = "steel"\n'
         '[contact.crown]\nradius = "100 m"\n[contact.shear]\n'
         + COULOMB

@@ -67,9 +67,8 @@ def test_exact_fixture_table_has_the_computed_values(tilted, fixtures, tilt):
 def test_always_error_estimates_cover_an_independent_solution(tilted, fixtures):
     """The error estimates cover the solution of an independent program with elements of order 5."""
     pieces = fixtures.held_pieces(1e-3, None)
-    measures = tilted.estimate_static_measures(
-        solve_patch_contact(pieces, tilted.pair(1)), solve_patch_contact(pieces, tilted.pair(0))
-    )
+    meshes = [solve_patch_contact(pieces, tilted.pair(k)) for k in (1, 0)]
+    measures = tilted.with_static_measures(meshes, None)[0].measures
     # values of an independent program with elements of order 5
     reference = {
         "contact_fraction": 0.0239193,

@@ -63,15 +63,13 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
         return STYLE_FUNCTIONS[chart.style](answers, chart)
     if len(answers) > 1:
         chart = replace(chart, by="")
-    selected = {
-        name: _select_span(_reduce_faces(answer.data, chart), chart)
-        for name, answer in answers.items()
-    }
+    selected = {}
+    for name, answer in answers.items():
+        selected[name] = _select_span(_reduce_faces(answer.data, chart), chart)
+    drawn_fields = [answer.data.get(chart.y) for answer in answers.values()]
     if chart.style == "face":
         chart = replace(chart, style="map")
-    elif chart.style != "map" and any(
-        _is_over_face(answer.data.get(chart.y)) for answer in answers.values()
-    ):
+    elif chart.style != "map" and any(map(_is_over_face, drawn_fields)):
         caption = chart.caption.replace("the elements beside a node", "cells")
         chart = replace(chart, title=f"{chart.title}, cut at y = 0", caption=caption)
     selected = {name: data for name, data in selected.items() if data}

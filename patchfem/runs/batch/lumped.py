@@ -384,11 +384,25 @@ def estimate_errors(
 
 
 def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dict[str, np.ndarray]:
-    """Return the errors (n,) by name of the measures of a march by exact steps.
+    """Return the errors of the measures of a march by exact steps.
 
     The work of a motion that repeats may be wrong by the error of the motion times the work that the largest force does
     over the amplitude. While a point sticks, the work of a cycle is the change of the energy of its spring, so that it may
     be wrong only by the difference of two cycles.
+
+    Parameters
+    ----------
+    cases : Cases
+        The n cases.
+    scales : Scales
+        Stiffnesses of the cases during stick.
+    march : CaseMarch
+        March of the cases, with the values of their measures.
+
+    Returns
+    -------
+    dict of str to (n,) ndarray
+        Error of each measure by name, in its unit.
     """
     values = march.values
     repeat_error = find_repeat_error(cases, SAME_CASE_CYCLE)

@@ -129,12 +129,10 @@ def _insert_findings(model: Model, batch: Batch, results: CaseResults) -> None:
     is_missed = (ratios > 1).any(axis=0) & (batch.outcome != OutcomeCode.FAILED)
     for case in np.flatnonzero(is_missed).tolist():
         excess = {name: ratio for name, ratio in zip(names, ratios[:, case]) if ratio > 1}
-        missed = {
-            name: Measure(
-                batch.values[name][case], PATCH_TABLE[name].unit, batch.errors[name][case]
-            )
-            for name in excess
-        }
+        missed = {}
+        for name in excess:
+            unit = PATCH_TABLE[name].unit
+            missed[name] = Measure(batch.values[name][case], unit, batch.errors[name][case])
         advice = f"a finer mesh does not reduce it or is too expensive; {findings.USE_ERROR_ADVICE}"
         if not model.patch.mesh.is_automatic:
             advice = f"leave out {findings.ELEMENT_SIZE_KEY}"

@@ -303,11 +303,9 @@ def make_cells(
 def _divide_sides(patch_model: PatchModel, n_cells: int) -> tuple[int, int]:
     """Return the numbers of cells along x and y of a face, for their number along the longer side."""
     pieces = patch_model.pieces
-    longer = max(pieces.length, pieces.width)
-    n_x, n_y = (
-        max(MIN_CELLS_ACROSS, round(n_cells * side / longer))
-        for side in (pieces.length, pieces.width)
-    )
+    sides = pieces.length, pieces.width
+    longer = max(sides)
+    n_x, n_y = (max(MIN_CELLS_ACROSS, round(n_cells * side / longer)) for side in sides)
     return n_x, n_y
 
 
@@ -672,7 +670,22 @@ def make_force_function(patch: AreaPatch):
 
 
 def transfer_to_grid(values: np.ndarray, patch: AreaPatch, other: AreaPatch) -> np.ndarray:
-    """Interpolate values (m,) at the cells of a face linearly to those of another grid, (k,)."""
+    """Interpolate values at the cells of a face linearly to those of another grid.
+
+    Parameters
+    ----------
+    values : (m,) ndarray
+        Values at the cells of the face, in any unit.
+    patch : AreaPatch
+        Face with these m cells.
+    other : AreaPatch
+        Face with k cells on the same pieces.
+
+    Returns
+    -------
+    (k,) ndarray
+        Values at the cells of the other face.
+    """
     rows = values.reshape(patch.shape)
     fine = patch.cells.normal
     coarse = other.cells.normal

@@ -140,6 +140,7 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> C
     - a coarser mesh, if the run has a coarser patch and its load varies or it slips in part;
     - another number of shear modes, if the load varies, the slide goes over grooves, or a law acts at the nodes of a
       patch;
+    - half the cells of an Iwan model, which represent its continuous density to order 2;
     - other settings of a bond summation.
 
     Parameters
@@ -170,6 +171,9 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> C
     if n_modes and (varies or model.grooves is not None or has_modes):
         coarser = replace(quarter, shear_modes=slip.shear_modes.comparison_mode_count(n_modes))
         coarser_runs.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
+    if any(interface.numbers.law == "iwan" for interface in model.rig.friction.interfaces):
+        halved = replace(quarter, has_half_cells=True)
+        coarser_runs.append(CoarserRuns((halved,), second_order_errors, quarter))
     return [*coarser_runs, *_list_bond_sum_runs(model, quarter, patch, solution)]
 
 

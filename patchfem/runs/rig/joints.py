@@ -177,7 +177,21 @@ def replace_averaged_law(law, model: Model, patch):
     """Return Coulomb's law in place of a law that averages the pressure; other laws are unchanged.
 
     On a rigid block the sum of the friction limits of all nodes is a constant fraction of the load, which replaces the
-    coefficient of `law`. `patch` is the solved patch with the pressure, or None for a single point.
+    coefficient of friction.
+
+    Parameters
+    ----------
+    law : Friction
+        Effective keys of the friction law.
+    model : Model
+        Rig with the patch.
+    patch : Patch or None
+        Solved patch with the pressure; None for a single point.
+
+    Returns
+    -------
+    Friction
+        Keys of the law of the resultant.
     """
     if not law_has_trait(law.law, "averaged"):
         return law

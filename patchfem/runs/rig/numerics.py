@@ -41,6 +41,7 @@ class Numerics:
     - meshed: indices of the interfaces whose patches have a coarser mesh.
     - coarse_patch: whether the patch of [contact] has a coarser mesh.
     - stiffer_joint: whether a joint that is subtracted from bolted modes is stiffer by its error.
+    - has_half_cells: whether Iwan models of time steps have half their cells.
     """
 
     engine: str
@@ -55,6 +56,7 @@ class Numerics:
     meshed: tuple[int, ...] = ()
     coarse_patch: bool = False
     stiffer_joint: bool = False
+    has_half_cells: bool = False
 
     def finer(self):
         """Return finer settings for the next run.

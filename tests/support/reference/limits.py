@@ -47,7 +47,6 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "runs.rig.costs.MAX_MARCH_STEPS_PER_CYCLE": (
         "steps per cycle of a time integration, if the tolerance determines the steps"
     ),
-    "points.time_march.MAX_LIST_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
     "hybrid.cases.MAX_STEPS": "steps of a motion from event to event, with method `exact` or by engine `hybrid`, beside "
     "100 in each cycle",

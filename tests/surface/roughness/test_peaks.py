@@ -143,8 +143,7 @@ def test_exact_three_ways_to_define_peaks_agree(tmp_path, monkeypatch):
     assert notes[0] and notes[1]
     assert not notes[2]
     runs[0].save(tmp_path / "out/first")
-    (tmp_path / "again.toml").write_text((tmp_path / "out/first/scene.resolved.toml").read_text())
-    second_run = pf.run(tmp_path / "again.toml")
+    second_run = pf.run(tmp_path / "out/first/scene.resolved.toml")
     assert second_run.measures["normal_stiffness"].value == pytest.approx(stiffnesses[0], rel=1e-12)
 
 
