@@ -56,10 +56,10 @@ def choose_unit(ladder: tuple[DisplayUnit, ...], size: float) -> DisplayUnit:
     Returns
     -------
     DisplayUnit
-        The smallest unit in which the number is less than 1000, or less than 0.001 in the next larger unit.
+        The smallest unit in which the number is less than 1000, or less than 0.01 in the next larger unit.
     """
     for (name, scale), (_, next_scale) in pairwise(ladder):
-        if abs(size) * scale < 1000 or abs(size) * next_scale < 1e-3:
+        if abs(size) * scale < 1000 or abs(size) * next_scale < 1e-2:
             return name, scale
     return ladder[-1]
 

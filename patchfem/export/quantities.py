@@ -28,9 +28,8 @@ MAX_INTERVAL_END_DIGITS = 11
 SURFACE_QUANTITY_DIGITS = 4
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
 PERCENT_NAME_ENDINGS = ("fraction", "share")
-# display units of areas of sections and of wear coefficients
+# display units of wear coefficients and of slopes
 DISPLAY_UNIT_LADDERS = UNIT_LADDERS | {
-    "m2": (("um^2", 1e12),),
     "m2 N-1": (("m^2/N", 1.0),),
     "m m-1": (("um/mm", 1e3),),  # slopes of roughness profiles
 }
