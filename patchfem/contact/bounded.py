@@ -32,6 +32,10 @@ GAP_ROUND_OFF = 1e-15
 # Largest error of a resultant, relative to the largest prescribed one, at which the tractions are not restored again
 RESULTANT_TOL = 1e-12
 MAX_RESTORATIONS = 40  # Largest number of Newton steps that restore the resultants
+# Rounding errors of the resultants, in units of the last digit of the tractions that the shift adds
+RESULTANT_ROUND_OFF = 16 * np.finfo(float).eps
+# Share of the response of all cells in Newton's response; fewer cells between the bounds than motions have none of their own
+UNLOADED_CELL_SHARE = 1e-9
 
 
 class BoundedProblem(NamedTuple):
@@ -308,7 +312,14 @@ class _Holder:
         held = np.where(is_fitted, 0.0, motion)
         remainder = (slope - self.move(held))[is_free]
         rigid = self.rigid[is_fitted][:, is_free.ravel()]
-        fitted = np.linalg.lstsq(rigid @ rigid.T, rigid @ remainder, rcond=1e-13)[0]
+        normal_matrix = rigid @ rigid.T
+        fitted = np.zeros(len(rigid))
+
+        # The second solution removes the rounding error of the first: where few cells touch, the gaps exceed the
+        # displacements by many orders of magnitude.
+        for _ in range(2):
+            remainder_after_fit = rigid @ (remainder - fitted @ rigid)
+            fitted = fitted + np.linalg.lstsq(normal_matrix, remainder_after_fit, rcond=1e-13)[0]
         held[is_fitted] = fitted
         return held
 
@@ -390,29 +401,36 @@ class _Holder:
 
         shift = np.zeros(self.n_motions)
         error = find_error(shift)
+        all_response = rigid @ rigid.T / self.self_compliance
         for _ in range(MAX_RESTORATIONS):
-            if np.abs(error).max() <= tolerance:
+            # A small load may be the difference of large tractions; its rounding error cannot be restored
+            added = shift @ rigid / self.self_compliance
+            moved = start + added
+            is_inside = (moved > lower) & (moved < upper)
+            round_off = RESULTANT_ROUND_OFF * np.abs(added[is_inside]).sum()
+            if np.abs(error).max() <= max(tolerance, round_off):
                 out = np.clip(traction, self.lower, self.upper)
-                out.flat[movable] = np.clip(
-                    start + shift @ rigid / self.self_compliance, lower, upper
-                )
+                out.flat[movable] = np.clip(moved, lower, upper)
                 return _State(out, motion + shift)
-            moved = start + shift @ rigid / self.self_compliance
-            inside = rigid[:, (moved > lower) & (moved < upper)]
-            if inside.shape[1] < self.n_motions:
-                inside = rigid
+            inside = rigid[:, is_inside]
             response = inside @ inside.T / self.self_compliance + np.diag(self.springs)
+            response += UNLOADED_CELL_SHARE * all_response
             direction = np.linalg.lstsq(response, error, rcond=1e-13)[0]
 
-            # The derivative of the concave dual function along the direction falls from a positive value through 0
+            # The derivative of the concave dual function along the direction falls from a positive value through 0; the
+            # step ends where half of it is left
             slope = float(direction @ error)
-            length = 1.0
-            for _ in range(MAX_RESTORATIONS):
+            low, high, length = 0.0, np.inf, 1.0
+            for _ in range(2 * MAX_RESTORATIONS):
                 new_error = find_error(shift + length * direction)
                 new_slope = float(direction @ new_error)
-                if abs(new_slope) <= 0.9 * slope:
+                if abs(new_slope) <= slope / 2:
                     break
-                length *= 2.0 if new_slope > 0 else 0.5
+                if new_slope > 0:
+                    low = length
+                else:
+                    high = length
+                length = 2 * length if high == np.inf else (low + high) / 2
             shift = shift + length * direction
             error = new_error
         return None

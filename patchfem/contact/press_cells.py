@@ -84,7 +84,7 @@ def press_cells(
     PatchfemError
         If the hardness times the area of the face is below the load.
     NotConverged
-        If the tolerance is not met.
+        If the tolerance is not met, or if the load line lies beyond the centres of the cells.
     """
     largest_load = loading.hardness * compliance.cell_area * gap.size
     if loading.load is not None and loading.load >= largest_load:
@@ -129,6 +129,14 @@ def _make_problem(compliance: CellCompliance, gap, loading: FaceLoading) -> Boun
         (x, loading.line_x, loading.spring_x),
         (y, loading.line_y, loading.spring_y),
     ]
+    for motion, line, spring in axes[1:]:
+        outermost = motion.max()
+        if line is not None and spring == 0 and abs(line) > outermost:
+            raise NotConverged(
+                f"contact: the load line at {abs(line):.5g} m lies beyond the centres of the outermost cells, at "
+                f"{outermost:.5g} m, so that no pressure of these cells balances the load; raise contact.area.cells or "
+                "move contact.load_line inwards"
+            )
     motions, lines, springs = zip(*(axis for axis in axes if axis[1] is not None))
     area = compliance.cell_area
     target = loading.load / area * np.array(lines)

@@ -10,7 +10,7 @@ from hexahedra import Block, compute_stamp_stiffness
 
 from patchfem.contact import FaceLoading, make_block
 from patchfem.contact.press_cells import compute_set_stiffness, press_cells
-from patchfem.core import PatchfemError
+from patchfem.core import NotConverged, PatchfemError
 from patchfem.elasticity import BlockShape, Layers, make_stack, sides
 from patchfem.slip.first_loading import (
     SLIP,
@@ -195,6 +195,29 @@ def test_exact_pressure_scales_with_gap_and_load():
     gap = (normal.x**2 + 2 * normal.y[:, None] ** 2) / 5
     other = press_cells(normal, gap, FaceLoading(2 * LOAD))
     assert other.pressure == pytest.approx(2 * one.pressure, abs=1e-6 * one.pressure.max())
+
+
+@pytest.mark.parametrize("load", [1e-9, 1e-3, 1.0, 1e5])
+@pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
+def test_exact_equilibrium_where_points_barely_touch(load, radius):
+    """Resultants and signs hold from three cells in contact to a full face, whatever the gaps beside them."""
+    normal = get_block().normal
+    gap = normal.x**2 / (2 * radius) + normal.y[:, None] ** 2 / (8 * radius)
+    line = (0.9e-3, -0.3e-3)
+    pressed = press_cells(normal, gap, FaceLoading(load, line_x=line[0], line_y=line[1]))
+    force = pressed.pressure * normal.cell_area
+    assert force.sum() == pytest.approx(load, rel=1e-7)
+    assert (force @ normal.x).sum() == pytest.approx(load * line[0], rel=1e-6)
+    assert (normal.y @ force).sum() == pytest.approx(load * line[1], rel=1e-6)
+    assert pressed.pressure.min() >= 0 and pressed.gap.min() >= 0
+
+
+def test_refuses_load_line_beyond_the_cells():
+    """A load line within half a cell of an end cannot be balanced by these cells."""
+    normal = get_block().normal
+    line = normal.x[-1] + 0.1 * (normal.x[1] - normal.x[0])
+    with pytest.raises(NotConverged, match="contact.area.cells"):
+        press_cells(normal, np.zeros(normal.shape), FaceLoading(LOAD, line_x=line))
 
 
 def test_exact_hardness_bounds_the_pressure():
