@@ -216,7 +216,7 @@ def test_refuses_load_line_beyond_the_cells():
     """A load line within half a cell of an end cannot be balanced by these cells."""
     normal = get_block().normal
     line = normal.x[-1] + 0.1 * (normal.x[1] - normal.x[0])
-    with pytest.raises(NotConverged, match="contact.area.cells"):
+    with pytest.raises(NotConverged, match=r"contact\.area\.cells"):
         press_cells(normal, np.zeros(normal.shape), FaceLoading(LOAD, line_x=line))
 
 
