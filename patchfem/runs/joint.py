@@ -131,7 +131,7 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
             stiffness, stiffer = find_bolted_stiffness(written, written_patches)
             (spring,) = bolted.spring.stiffness
             subtracted = bolted.spring._replace(
-                stiffness=(stiffness + spring,), error=stiffer - stiffness
+                stiffness=(float(stiffness + spring),), error=float(stiffer - stiffness)
             )
         joints = (subtracted, subtracted.stiffen())
         builders = (bolted.build_rig, bolted.build_stiffer_rig or bolted.build_rig)

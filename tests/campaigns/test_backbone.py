@@ -1,5 +1,7 @@
 """Backbones of rigs by three methods, compared with each other and with closed forms."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from scene_texts import IWAN, make_shaken_block
@@ -424,3 +426,11 @@ def test_quasi_static_curve_ends_at_maximum_force():
     assert points[:, :0:-1] == pytest.approx(np.array([curve.frequency, curve.damping]), rel=1e-9)
     assert "curve does not reach these" in backbone.notes[0]
     assert backbone.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
+
+
+def test_backbone_of_a_face_states_the_subtracted_joint():
+    """The scene in SI of a bench over a face has the stiffness that was subtracted from the modes, as a number."""
+    curves = pf.backbone(pf.new("area"), **{"contact.area.cells": 32, "slide.amplitude": "1 um"})
+    stuck = tomllib.loads(curves.attrs["scene"])["structure"]["measured_stiffness"]
+    number, unit = stuck.split()
+    assert float(number) == pytest.approx(358e6, rel=5e-3) and unit == "N/m"
