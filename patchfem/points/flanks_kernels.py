@@ -10,7 +10,7 @@ from math import cos, sin, sqrt
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from .march_rows import Flank
+from .march_rows import Flank, Port, Sample
 
 GAUSS_POINT = sqrt(0.6)  # outer node of the Gauss rule of three points
 MIN_PHASE = 1e-4  # phase [rad] below which a series replaces sin(x)/x
@@ -78,6 +78,32 @@ def find_stiffness(flank, q, dq, dt):
 
 
 @njit(**NJIT_CALL)
+def add_climb(flank, moves, dq, dt):
+    """Write force and slope of the port that climbs, from those of its points along the flank.
+
+    F = V t + r f and dF/dq = K + r^2 df/ds, with the ratio r of path to displacement.
+
+    Parameters
+    ----------
+    flank : (k,) array
+        Numbers of the flanks, in the rows of `march_rows.Flank`; TRIAL_FORCE becomes the force along the flank.
+    moves : (k, p) array
+        Values of the ports, in the rows of `march_rows.Port`.
+    dq : float
+        Increment of the slide [m].
+    dt : float
+        Duration of the step [s].
+    """
+    flank[Flank.TRIAL_FORCE] = moves[Port.SUM, 0]
+    ratio = flank[Flank.RATIO]
+    stiffness = find_stiffness(flank, moves[Port.SLIDE, 0], dq, dt)
+    moves[Port.SUM, 0] = (
+        flank[Flank.TRIAL_VERTICAL] * flank[Flank.SLOPE] + ratio * moves[Port.SUM, 0]
+    )
+    moves[Port.BY_SLIDE, 0] = stiffness + ratio * ratio * moves[Port.BY_SLIDE, 0]
+
+
+@njit(**NJIT_CALL)
 def find_normal(flank, q, friction, bound):
     """Return the normal force [N] at a slide q, for a mean friction force of the step; `bound` is mu [1].
 
@@ -109,3 +135,55 @@ def find_energy(flank, q):
     return (
         flank[Flank.LOAD] * height + 0.5 * flank[Flank.LIFTED_MASS] * flank[Flank.RISE_SPEED] ** 2
     )
+
+
+@njit(**NJIT_CALL)
+def accept_climb(flank, dq, dt):
+    """Advance the lifted mass over an accepted step.
+
+    The mean of its rise speed over the step is slope dq/dt.
+
+    Parameters
+    ----------
+    flank : (k,) array
+        Numbers of the flanks, in the rows of `march_rows.Flank`.
+    dq : float
+        Increment of the slide [m].
+    dt : float
+        Duration of the step [s].
+    """
+    rise = 2 * flank[Flank.SLOPE] * dq / dt
+    flank[Flank.RISE_SPEED] = rise - flank[Flank.RISE_SPEED]
+    flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL]
+    if flank[Flank.LIFTED_MASS] > 0 and not flank[Flank.VERTICAL] > 0:
+        flank[Flank.HAS_LIFTED] = 1.0
+
+
+@njit(**NJIT_CALL)
+def write_sample(flank, q, path, sample, size):
+    """Write force, slip, load and the energy of the flank to a sample that has those of the points.
+
+    The points know the path along the flank; the slip is the displacement less the stretch along it. The force of the port
+    is V t + f sqrt(1 + t^2), with the vertical force V and the friction f along the flank.
+
+    Parameters
+    ----------
+    flank : (k,) array
+        Numbers of the flanks, in the rows of `march_rows.Flank`.
+    q : float
+        Slide [m].
+    path : float
+        Displacement of the point along the flank [m].
+    sample : (k,) array
+        Sample, in the rows of `march_rows.Sample`; output.
+    size : int
+        Number of modal coordinates and velocities, the first columns.
+    """
+    first = size + Sample.PORTS
+    t = find_slope(flank, q)
+    length = sqrt(1 + t * t)
+    stretch = path - sample[first + 1]
+    sample[first] = flank[Flank.VERTICAL] * t + sample[first] * length
+    sample[first + 1] = q - stretch / length
+    sample[size + Sample.LOAD] = flank[Flank.VERTICAL]
+    sample[size + Sample.ENERGY] += find_energy(flank, q)

@@ -38,7 +38,7 @@ def write_list_mean(numbers, values, lists, j, dt):
     ----------
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
-    values : (13, m) array
+    values : (12, m) array
         Values of the points, in the rows of `march_rows.Point`.
     lists : BondLists
         Lists of bonds of all points.
@@ -67,7 +67,7 @@ def advance_list(numbers, values, lists, j, v0, v1, dt):
     ----------
     numbers : (k, m) array
         Numbers of the laws of m points; row 0 is the `Law`.
-    values : (13, m) array
+    values : (12, m) array
         Values of the points, in the rows of `march_rows.Point`.
     lists : BondLists
         Lists of bonds of all points.

@@ -30,29 +30,28 @@ step of level k lasts a whole step over 2^k.
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from ..contact.set_arrays import PRESENT_SLOT_INDEX, REFERENCE_LOAD_INDEX, REFERENCE_MOMENT_INDEX
+from ..contact.set_arrays import PRESENT_SLOT_INDEX
 from . import bonds_kernels as bonds
 from . import flanks_kernels as flanks
 from . import lists_kernels as lists
 from . import normal_kernels as normal
 from .law_rows import Law, Masing
-from .march_rows import (
-    DONE,
-    EXCEEDS_TRAVEL,
-    LEAVES_GROOVES,
-    LOWER,
-    N_PORT_COLUMNS,
-    NO_CONTACT_SET,
-    NOT_FINITE,
-    RESIDUAL,
-    Flank,
-    Point,
-    Port,
-    Sample,
-    Shear,
-    Total,
+from .march_rows import LOWER, N_PORT_COLUMNS, RESIDUAL, Flank, Point, Port, Sample, Shear, Total
+from .motion_kernels import (
+    INCREMENT_ROUND_OFF,
+    TINY_LOAD,
+    advance_shear,
+    find_point_load,
+    find_port_residual,
+    find_resultant,
+    move_ports,
+    solve_linear,
+    store_base,
+    subtract_step,
+    sum_products,
+    sum_triples,
 )
 from .return_maps_kernels import (
     Step,
@@ -73,74 +72,7 @@ LISTS_STALLED = 1e5
 LIST_DAMPING = 1 / 16  # weight of the change of a shear increment for lists, whose forces jump
 MAX_RELAXATIONS = 40  # Newton iterations of the pieces after a step
 MAX_LOADS = 60  # repetitions of a step for the loads that follow from its motion
-INCREMENT_ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
-
-
-@njit(**NJIT_CALL)
-def solve_linear(matrix, vector, n):
-    """Solve a dense system in place by Gauss-Jordan elimination with partial pivoting; return whether it is regular.
-
-    Parameters
-    ----------
-    matrix : (k, k) array
-        Matrix; overwritten.
-    vector : (k,) array
-        Right side, and the solution afterwards.
-    n : int
-        Number of unknowns, the first of the arrays.
-    """
-    # Elimination; the pivot is the largest entry of the column.
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        if matrix[best, k] == 0.0:
-            return False
-        if best != k:
-            for c in range(k, n):
-                matrix[k, c], matrix[best, c] = matrix[best, c], matrix[k, c]
-            vector[k], vector[best] = vector[best], vector[k]
-
-        for i in range(n):
-            factor = matrix[i, k] / matrix[k, k]
-            if factor != 0.0 and i != k:
-                for c in range(k + 1, n):
-                    matrix[i, c] -= factor * matrix[k, c]
-                vector[i] -= factor * vector[k]
-
-    for k in range(n):
-        vector[k] /= matrix[k, k]
-    return True
-
-
-@njit(**NJIT_CALL)
-def sum_products(first, second):
-    """Return the sum of the products of the entries of two arrays."""
-    total = 0.0
-    for j in range(second.size):
-        total += first[j] * second[j]
-    return total
-
-
-@njit(**NJIT_CALL)
-def sum_triples(first, second, third):
-    """Return the sum of the products of the entries of three arrays.
-
-    Parameters
-    ----------
-    first : (m,) array
-        First factors.
-    second : (m,) array
-        Second factors.
-    third : (m,) array
-        Third factors.
-    """
-    total = 0.0
-    for j in range(third.size):
-        total += first[j] * second[j] * third[j]
-    return total
 
 
 @njit(**NJIT_CALL)
@@ -177,61 +109,6 @@ def is_held(points, p):
 
 
 @njit(**NJIT_CALL)
-def move_freely(system, level, drive, row, fraction):
-    """Compute the motion in a step as if no interface acted: row 1 of `system.state`, and four rows of `Port`.
-
-    SLIDE and VELOCITY are those of a port at the start of the step, FREE its increment [m] and FREE_VELOCITY its
-    velocity [m/s] at the end without forces. If the displacement of port 0 is prescribed, these are the prescribed
-    ones.
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Arrays of the march, changed in place.
-    level : int
-        Level of the step, which lasts a whole step over 2^level.
-    drive : tuple of float
-        Value, slope and second derivative of the drive at the start of the step [m s-2], per second and per second
-        squared.
-    row : int
-        Number of the whole step.
-    fraction : float
-        Time at the start of the step, as a fraction of the whole step.
-    """
-    response = system.structure.responses[level]
-    state = system.state
-    size = state.shape[1]
-    n = size // 2
-    values = system.ports.values
-
-    path = system.structure.path
-    if path.size:
-        # The displacement of port 0 is prescribed, at a constant velocity in a step.
-        slope = path[row + 1] - path[row]
-        values[Port.SLIDE, 0] = path[row] + fraction * slope
-        values[Port.FREE, 0] = slope / (1 << level)
-        values[Port.VELOCITY, 0] = values[Port.FREE_VELOCITY, 0] = slope / system.options.step
-        return
-    inputs = system.structure.inputs
-    for i in range(size):
-        inputs[i] = state[0, i]
-    for i in range(3):
-        inputs[size + i] = drive[i]
-    for i in range(size):
-        state[1, i] = sum_products(response[i], inputs[: size + 3])
-
-    rows = system.ports.rows
-    for p in range(rows.shape[0]):
-        values[Port.SLIDE, p] = sum_products(rows[p], state[0, :n])
-        values[Port.VELOCITY, p] = sum_products(rows[p], state[0, n:])
-        values[Port.FREE_VELOCITY, p] = sum_products(rows[p], state[1, n:])
-        free = 0.0
-        for i in range(n):
-            free += rows[p, i] * (state[1, i] - state[0, i])
-        values[Port.FREE, p] = free
-
-
-@njit(**NJIT_CALL)
 def prepare_points(system, dt):
     """Set the trial memory of the points for a step of `dt` [s]: loads and bond lengths are those in its middle.
 
@@ -264,8 +141,7 @@ def prepare_points(system, dt):
 def write_forces(system, level, dt):
     """Compute increments and mean forces of ports and points under the assumed port forces `Port.FORCE`.
 
-    With the compliances C and G the port p moves by INCREMENT = FREE_p - sum_k C_pk F_k, and ends with the velocity
-    FREE_VELOCITY_p - sum_k G_pk F_k. SUM, BY_SLIDE and BY_VELOCITY are the forces of its points and their derivatives.
+    SUM, BY_SLIDE and BY_VELOCITY of a port are the forces of its points and their derivatives.
     The forces of rigid points at rest are not known here.
 
     Parameters
@@ -281,20 +157,11 @@ def write_forces(system, level, dt):
     points = system.points
     values = points.values
     moves = ports.values
-    compliance = ports.compliance[level]
     flank = system.flank
     count = points.port.size
     n_ports = moves.shape[1]
 
-    # Motion of the ports: the free one less the compliance times the port forces.
-    for p in range(n_ports):
-        dq = moves[Port.FREE, p]
-        v = moves[Port.FREE_VELOCITY, p]
-        for k in range(n_ports):
-            dq -= compliance[0, p, k] * moves[Port.FORCE, k]
-            v -= compliance[1, p, k] * moves[Port.FORCE, k]
-        moves[Port.INCREMENT, p] = dq
-        moves[Port.END_VELOCITY, p] = v
+    move_ports(system, level)
     if flank.size:
         flanks.climb(flank, moves[Port.SLIDE, 0], moves[Port.INCREMENT, 0], dt)
 
@@ -320,15 +187,9 @@ def write_forces(system, level, dt):
         moves[Port.BY_SLIDE, p] = values[Point.BY_SLIDE, first:end].sum()
         moves[Port.BY_VELOCITY, p] = values[Point.BY_VELOCITY, first:end].sum()
 
-    # On a flank, F = V t + r f and dF/dq = K + r^2 df/ds with the ratio r of path to displacement.
     if flank.size:
-        flank[Flank.TRIAL_FORCE] = moves[Port.SUM, 0]
-        ratio = flank[Flank.RATIO]
-        vertical = flank[Flank.TRIAL_VERTICAL] * flank[Flank.SLOPE]
-        stiffness = flanks.find_stiffness(flank, moves[Port.SLIDE, 0], moves[Port.INCREMENT, 0], dt)
-        moves[Port.SUM, 0] = vertical + ratio * moves[Port.SUM, 0]
-        moves[Port.BY_SLIDE, 0] = stiffness + ratio * ratio * moves[Port.BY_SLIDE, 0]
-        moves[Port.BY_VELOCITY, 0] *= ratio
+        flanks.add_climb(flank, moves, moves[Port.INCREMENT, 0], dt)
+        moves[Port.BY_VELOCITY, 0] *= flank[Flank.RATIO]
 
     if system.structure.path.size:
         moves[Port.FORCE, 0] = moves[Port.SUM, 0]
@@ -361,7 +222,7 @@ def write_point_forces(system, level, dt):
 
         # The force of a rigid point at rest is unknown until its port is solved.
         p = points.port[j]
-        if is_held(points, p):
+        if ports.values[Port.HELD, p] > 0:
             values[Point.FORCE, j] = values[Point.BY_SLIDE, j] = values[Point.BY_VELOCITY, j] = 0.0
             continue
 
@@ -399,7 +260,6 @@ def write_residual(system, level, dt):
     vector = ports.vector
     n_ports = moves.shape[1]
     size = system.options.scale
-    heave = int(ports.contact[0])
 
     # A port force is the sum over its points.
     for p in range(n_ports):
@@ -407,37 +267,16 @@ def write_residual(system, level, dt):
         size = max(size, abs(moves[Port.FORCE, p]))
 
     # Heave and pitch also carry the change of load and moment of the contact.
-    if heave >= 0:
-        pitch = int(ports.contact[1])
-        increments = moves[Port.INCREMENT]
-        slides = moves[Port.SLIDE]
-        normal.path_mean(
-            system.sets,
-            system.sets.counters[PRESENT_SLOT_INDEX],
-            slides[heave],
-            slides[pitch],
-            increments[heave],
-            increments[pitch],
-            ports.contact[2:11],
-        )
-        vector[heave] += ports.contact[2]
-        vector[pitch] += ports.contact[3]
-        size = max(size, abs(ports.contact[2]))
+    if ports.contact[0] >= 0:
+        size = max(size, normal.add_residuals(system))
 
     # A port that is held has the velocity 0 at the end: its residual is the force that would stop it. Ports that one mode
     # holds together share their force by the small compliance `redundant`.
-    largest = 0.0
-    tolerance = RESIDUAL * size
     for p in range(n_ports):
-        if is_held(points, p):
+        if moves[Port.HELD, p] > 0:
             vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
             vector[p] -= ports.redundant[p] * moves[Port.FORCE, p]
-        own = ports.compliance[level, 0, p, p]
-        noise = INCREMENT_ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
-        # The normal contact loses no energy, so that its residuals would add up over the steps.
-        weight = 10.0 if p >= heave >= 0 else 1.0
-        if own > 0 or p != 0 or not system.structure.path.size:
-            largest = max(largest, weight * abs(vector[p]) / (tolerance + noise))
+    largest = find_port_residual(system, level, size)
 
     # kappa (b + db/2) = shapes^T f, with a damped change of db.
     shear = points.shear
@@ -450,7 +289,7 @@ def write_residual(system, level, dt):
         residual += damping * points.stiffness[k] * change
         residual -= sum_products(points.shapes[k], forces)
         vector[n_ports + k] = residual
-        largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / tolerance)
+        largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / (RESIDUAL * size))
     return largest
 
 
@@ -477,15 +316,8 @@ def write_matrix(system, level):
         for k in range(points.stiffness.size):
             matrix[p, n_ports + k] = 0.0
 
-    # The contact couples heave and pitch by the derivatives of its load and moment (`ports.contact[7:11]`).
-    heave = int(ports.contact[0])
-    if heave >= 0:
-        pitch = int(ports.contact[1])
-        for i in range(2):
-            p = heave if i == 0 else pitch
-            for k in range(n_ports):
-                change = ports.contact[7 + 2 * i] * compliance[0, heave, k]
-                matrix[p, k] -= change + ports.contact[8 + 2 * i] * compliance[0, pitch, k]
+    if ports.contact[0] >= 0:
+        normal.add_slopes(system, level)
 
     # All points that share shear coordinates act on the port of the first one. The residual of a coordinate has
     # kappa (b + db/2) and the damping of Newton's change of db.
@@ -507,7 +339,7 @@ def write_matrix(system, level):
     # Ports that hold have the derivative of their end velocity in place of that of a force. A small compliance of their
     # own makes the forces unique where more ports hold than there are modes.
     for p in range(n_ports):
-        if is_held(points, p):
+        if moves[Port.HELD, p] > 0:
             matrix[p, :] = 0.0
             for k in range(n_ports):
                 matrix[p, k] = -compliance[1, p, k] / compliance[1, p, p]
@@ -580,13 +412,7 @@ def take_step(system, level, dt, fraction):
     fraction : float
         Fraction of the step of Newton's method.
     """
-    ports = system.ports
-    shear = system.points.shear
-    n_ports = ports.values.shape[1]
-    for p in range(n_ports):
-        ports.values[Port.FORCE, p] = ports.values[Port.BASE, p] - fraction * ports.step[p]
-    for k in range(system.points.stiffness.size):
-        shear[Shear.TRIAL, k] = shear[Shear.BASE, k] - fraction * ports.step[n_ports + k]
+    subtract_step(system, fraction)
     write_forces(system, level, dt)
     return write_residual(system, level, dt)
 
@@ -608,7 +434,6 @@ def solve_forces(system, level, dt):
     """
     ports = system.ports
     moves = ports.values
-    shear = system.points.shear
     totals = system.totals
     residual = np.inf
     smallest = np.inf
@@ -617,10 +442,7 @@ def solve_forces(system, level, dt):
     for count in range(MAX_NEWTON_ITERATIONS):
         if n_stalls >= MAX_STALLS and residual <= stalled:
             return True
-        for p in range(moves.shape[1]):
-            moves[Port.BASE, p] = moves[Port.FORCE, p]
-        for k in range(system.points.stiffness.size):
-            shear[Shear.BASE, k] = shear[Shear.TRIAL, k]
+        store_base(system)
         # The first pass evaluates the guess, so that the code of the laws appears only once.
         descent = 0.0
         if count > 0:
@@ -669,18 +491,6 @@ def solve_forces(system, level, dt):
 
 
 @njit(**NJIT_CALL)
-def interpolate_pressure(x, pattern):
-    """Return the relative pressure of the lower piece at x [m]; 0 outside its nodes."""
-    last = pattern.shape[1] - 1
-    if x < pattern[0, 0] or x > pattern[0, last]:
-        return 0.0
-    high = min(max(np.searchsorted(pattern[0], x), 1), last)
-    low = high - 1
-    part = (x - pattern[0, low]) / (pattern[0, high] - pattern[0, low])
-    return (1 - part) * pattern[1, low] + part * pattern[1, high]
-
-
-@njit(**NJIT_CALL)
 def find_loads(system, row, fraction, is_solved):
     """Compute the loads `Point.END_LOAD` [N] at the end of a step; return their largest change, -1 without a contact set.
 
@@ -699,153 +509,26 @@ def find_loads(system, row, fraction, is_solved):
     """
     ports = system.ports
     points = system.points
-    loads = system.structure.loads
     values = points.values
-    flank = system.flank
-    moves = ports.values
-    heave = int(ports.contact[0])
-
-    # The resultant follows from the normal contact, the flank or a prescribed history.
-    resultant = 0.0
-    if heave >= 0:
-        pitch = int(ports.contact[1])
-        up = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
-        turn = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
-        # Slot of the contact set, -1 if none is found. The load is that at rest less the slope of the energy in heave.
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
-        if slot < 0:
+    if ports.contact[0] >= 0:
+        resultant = normal.find_resultant(system, points.nodal)
+        if resultant < 0:
             return -1.0
-        normal.press_state(
-            system.sets, slot, -up, turn, values[Point.NODE_FORCE, : system.sets.x.size]
-        )
-        resultant = max(
-            system.sets.reference[REFERENCE_LOAD_INDEX]
-            - normal.compute_energy(system.sets, slot, up, turn)[1],
-            0.0,
-        )
+    else:
+        resultant = find_resultant(system, row, fraction, points.numbers[1, 0], is_solved)
 
-    elif flank.size:
-        if is_solved:
-            q = moves[Port.SLIDE, 0] + moves[Port.INCREMENT, 0]
-            flank[Flank.NORMAL] = flanks.find_normal(
-                flank, q, flank[Flank.TRIAL_FORCE], points.numbers[1, 0]
-            )
-        resultant = flank[Flank.NORMAL]
-
-    elif loads.size:
-        resultant = loads[row] + fraction * (loads[row + 1] - loads[row])
-
-    # Every point carries its share of the resultant, its nodal force or the pressure of the lower piece at its place.
     change = 0.0
-    total = 1e-300
+    total = TINY_LOAD
     for j in range(points.port.size):
         if points.is_spring[j]:
             continue
-        load = points.share[j] * resultant
-        if points.node[j] >= 0:
-            load = values[Point.NODE_FORCE, points.node[j]]
-        elif points.node[j] == LOWER:
-            x = points.place[j] + values[Point.TOTAL, j] + values[Point.SLIDE, j]
-            load = points.share[j] * interpolate_pressure(x, points.pressure)
+        x = points.place[j] + values[Point.TOTAL, j] + values[Point.SLIDE, j]
+        load = find_point_load(points, j, x, resultant)
         change = max(change, abs(load - values[Point.END_LOAD, j]))
         values[Point.END_LOAD, j] = load
         total += load
-    return 0.0 if loads.size and heave < 0 else change / total
-
-
-@njit(**NJIT_CALL)
-def write_trial(system, level):
-    """Write the state at the end of the step under the port forces to row 2 of `system.state`.
-
-    Modes are linear, so it is that without forces plus the responses to the modal forces, which complete the inputs of
-    the step (`Structure.inputs`).
-    """
-    response = system.structure.responses[level]
-    inputs = system.structure.inputs
-    state = system.state
-    ports = system.ports
-    size = state.shape[1]
-    for k in range(size // 2):
-        force = 0.0
-        for p in range(ports.rows.shape[0]):
-            force -= ports.rows[p, k] * ports.values[Port.FORCE, p]
-        inputs[size + 3 + k] = force / system.options.mass
-    for i in range(size):
-        state[2, i] = state[1, i] + sum_products(response[i, size + 3 :], inputs[size + 3 :])
-
-
-@njit(**NJIT_CALL)
-def find_holds(system, state, drive):
-    """Write the forces that hold rigid points at rest at an instant, to `Port.HOLD` [N].
-
-    Other ports receive the force of their points and of the normal contact.
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Arrays of the march, changed in place.
-    state : (2 n,) array
-        Modal coordinates and velocities.
-    drive : float
-        Drive at this instant [m s-2].
-    """
-    ports = system.ports
-    points = system.points
-    structure = system.structure
-    n = structure.modes.shape[1]
-    values = ports.values
-    n_ports = values.shape[1]
-
-    # Ports that are not held carry the friction force of their points.
-    for p in range(n_ports):
-        ports.vector[p] = 0.0
-        for j in range(points.first[p], points.first[p + 1]):
-            ports.vector[p] += read_point(system, j).force
-
-    heave = int(ports.contact[0])
-    if heave >= 0:
-        pitch = int(ports.contact[1])
-        up = sum_products(ports.rows[heave], state[:n])
-        turn = sum_products(ports.rows[pitch], state[:n])
-        energy = normal.compute_energy(
-            system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn
-        )
-        ports.vector[heave] += energy[1]
-        ports.vector[pitch] += energy[2]
-
-    # Ports at rest have no acceleration: grip . hold = acceleration without their forces.
-    for p in range(n_ports):
-        if not is_held(points, p):
-            continue
-        total = 0.0
-        for i in range(n):
-            acceleration = -structure.modes[1, i] * drive - structure.modes[0, i] * state[i]
-            acceleration -= sum_products(structure.damping[i], state[n:])
-            total += ports.rows[p, i] * acceleration
-        ports.vector[p] = total
-
-    solve_held(system)
-    for p in range(n_ports):
-        values[Port.HOLD, p] = ports.vector[p]
-
-
-@njit(**NJIT_CALL)
-def solve_held(system):
-    """Solve grip . x = vector for the ports at rest, in place in `ports.vector`.
-
-    `grip` is the acceleration of ports per force. The entries of the other ports are given values of x.
-    """
-    ports = system.ports
-    points = system.points
-    n_ports = ports.values.shape[1]
-    for p in range(n_ports):
-        for k in range(n_ports):
-            ports.matrix[p, k] = ports.grip[p, k] if is_held(points, p) else 0.0
-        if is_held(points, p):
-            ports.matrix[p, p] *= 1 + ports.redundant[p]
-        else:
-            ports.matrix[p, p] = 1.0
-    solve_linear(ports.matrix, ports.vector, n_ports)
+    is_prescribed = system.structure.loads.size and ports.contact[0] < 0
+    return 0.0 if is_prescribed else change / total
 
 
 @njit(**NJIT_CALL)
@@ -895,11 +578,13 @@ def find_event(system, drive, is_shortest):
 
     # Of the points whose limit is exceeded, that with the largest ratio is released. Row 2 of the state is that at the
     # end of the trial step.
-    find_holds(system, system.state[2], drive)
+    for p in range(ports.values.shape[1]):
+        ports.vector[p] = sum_forces(system, p)
+    normal.find_holds(system, system.state[2], drive)
     worst = -1
     largest = 1.0
     for p in range(ports.values.shape[1]):
-        if not is_held(points, p):
+        if ports.values[Port.HELD, p] == 0:
             continue
         j = points.first[p]
         limit = points.numbers[1, j] * points.values[Point.END_LOAD, j]
@@ -916,21 +601,19 @@ def find_event(system, drive, is_shortest):
 
 @njit(**NJIT_CALL)
 def commit(system, dt):
-    """Advance memories, shear coordinates and loads after an accepted step of `dt` [s]; bring held ports to rest.
+    """Advance memories, shear coordinates and loads after an accepted step of `dt` [s].
 
-    `Port.FREE` of a port with a rigid point becomes the displacement that is taken back because the point was at rest, and
-    0 for a port that slips.
+    `Port.RETURN` of a port with a rigid point becomes the displacement that is taken back because the point was at rest,
+    and 0 for a port that slips. `Total.REST` becomes the work of the drive on these displacements.
     """
     ports = system.ports
     points = system.points
     values = points.values
     options = system.options
-    flank = system.flank
     count = points.port.size
 
     # Slides and memory of the points. A port that was at rest before stays at its place.
     rest = 0.0
-    is_any_held = False
     is_short = options.has_only_bonds and bonds.are_paths_short(points)
     if is_short:
         bonds.advance_all(points)
@@ -941,11 +624,10 @@ def commit(system, dt):
         if points.numbers[0, j] == Law.LIST:
             commit_list(system, j, dt)
         elif points.numbers[0, j] == Law.COULOMB:
-            is_any_held = is_any_held or points.trial[0, j] == 0
-            was_held = is_held(points, p) and points.trial[0, j] == 0
-            ports.values[Port.FREE, p] = slide if was_held else 0.0
-            values[Point.TOTAL, j] -= ports.values[Port.FREE, p]
-            rest += ports.values[Port.FORCE, p] * ports.values[Port.FREE, p]
+            was_held = ports.values[Port.HELD, p] > 0 and points.trial[0, j] == 0
+            ports.values[Port.RETURN, p] = slide if was_held else 0.0
+            values[Point.TOTAL, j] -= ports.values[Port.RETURN, p]
+            rest += ports.values[Port.FORCE, p] * ports.values[Port.RETURN, p]
 
         else:
             v0 = ports.values[Port.VELOCITY, p]
@@ -966,37 +648,11 @@ def commit(system, dt):
 
     copy_memory(points.numbers, points.trial, points.memory)
 
-    # The rates of the last three steps extrapolate those of the next one.
-    shear = points.shear
-    for k in range(points.stiffness.size):
-        shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
-        shear[Shear.FIRST, k] = shear[Shear.EARLIER, k]
-        shear[Shear.EARLIER, k] = shear[Shear.LAST, k]
-        shear[Shear.LAST, k] = shear[Shear.TRIAL, k] / dt
-    if options.has_loads and not options.has_lists and points.stiffness.size:
-        relax_pieces(system)
-
-    for i in range(system.state.shape[1]):
-        system.state[0, i] = system.state[2, i]
-    # Held ports come back to rest, which may also move the holder.
-    energy = find_motion_energy(system)
-    if is_any_held and system.sets.counters[PRESENT_SLOT_INDEX] >= 0:
-        return_ports_to_rest(system)
-        rest += energy - find_motion_energy(system)
-        if ports.contact[0] >= 0:
-            press_at_rest(system)
     system.totals[Total.REST] = rest
 
-    # The mean of the rise speed over the step is slope dq/dt.
-    if flank.size:
-        rise = 2 * flank[Flank.SLOPE] * ports.values[Port.INCREMENT, 0] / dt
-        flank[Flank.RISE_SPEED] = rise - flank[Flank.RISE_SPEED]
-        flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL]
-        if flank[Flank.LIFTED_MASS] > 0 and not flank[Flank.VERTICAL] > 0:
-            flank[Flank.HAS_LIFTED] = 1.0
-        flank[Flank.FORCE] = 0.0
-        for j in range(count):
-            flank[Flank.FORCE] += read_point(system, j).force
+    advance_shear(points, dt)
+    if options.has_loads and not options.has_lists and points.stiffness.size:
+        relax_pieces(system)
 
 
 @njit(**NJIT_CALL)
@@ -1111,408 +767,6 @@ def read_point(system, j):
     return read(points.numbers, points.memory, j, load)
 
 
-@njit(cache=True, **NJIT_KERNEL)
-def read_points(system, forces, stretch):
-    """Write friction force [N] and elastic stretch [m] of all points (m,).
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Arrays of the march, changed in place.
-    forces : (m,) array
-        Forces of the points [N], output.
-    stretch : (m,) array
-        Elastic stretches of the points [m], output.
-    """
-    for j in range(system.points.port.size):
-        state = read_point(system, j)
-        forces[j] = state.force
-        stretch[j] = state.stretch
-
-
-@njit(**NJIT_CALL)
-def find_modal_energy(system):
-    """Return the energy of the modes [J]."""
-    state = system.state[0]
-    n = state.size // 2
-    energy = 0.0
-    for i in range(n):
-        energy += state[n + i] ** 2 + system.structure.modes[0, i] * state[i] ** 2
-    return 0.5 * system.options.mass * energy
-
-
-@njit(**NJIT_CALL)
-def find_motion_energy(system):
-    """Return the energy of the modes and of the normal contact [J], and find the present contact set."""
-    state = system.state[0]
-    ports = system.ports
-    n = state.size // 2
-    energy = find_modal_energy(system)
-    heave = int(ports.contact[0])
-    if heave >= 0:
-        up = sum_products(ports.rows[heave], state[:n])
-        turn = sum_products(ports.rows[int(ports.contact[1])], state[:n])
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
-        system.sets.counters[PRESENT_SLOT_INDEX] = slot
-        if slot >= 0:
-            energy += normal.compute_energy(system.sets, slot, up, turn)[0]
-    return energy
-
-
-@njit(**NJIT_CALL)
-def return_ports_to_rest(system):
-    """Bring the ports of rigid points at rest back to their places and to rest, by the smallest change of the modes.
-
-    A constant force over the step only makes their velocity vanish at its end. `Port.FREE` has their displacements.
-    """
-    ports = system.ports
-    points = system.points
-    state = system.state[0]
-    n = state.size // 2
-    n_ports = ports.rows.shape[0]
-
-    # Places and then velocities: grip . change = the deviation of the ports that hold.
-    for first in (0, n):
-        for p in range(n_ports):
-            ports.vector[p] = 0.0
-            if is_held(points, p):
-                ports.vector[p] = ports.values[Port.FREE, p]
-                if first > 0:
-                    ports.vector[p] = sum_products(ports.rows[p], state[n:])
-
-        solve_held(system)
-        for p in range(n_ports):
-            for i in range(n):
-                change = ports.rows[p, i] * ports.vector[p] / system.options.mass
-                state[first + i] -= change
-
-
-@njit(**NJIT_CALL)
-def press_at_rest(system):
-    """Give the points the loads of the normal contact at the present state, while their ports rest.
-
-    A start with heave, and ports that come back to rest, change the loads outside of steps.
-    """
-    ports = system.ports
-    points = system.points
-    values = points.values
-    n = system.state.shape[1] // 2
-    if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
-        return  # the march ends without a contact set
-
-    for i in range(2):
-        p = int(ports.contact[i])
-        ports.values[Port.SLIDE, p] = sum_products(ports.rows[p], system.state[0, :n])
-        ports.values[Port.INCREMENT, p] = 0.0
-    find_loads(system, 0, 0.0, False)
-
-    for j in range(points.port.size):
-        load = values[Point.END_LOAD, j]
-        if points.numbers[0, j] == Law.LIST:
-            lists.press_list(system.lists, j, load)
-        else:
-            press(points.numbers, points.memory, j, values[Point.START_LOAD, j], load)
-        values[Point.START_LOAD, j] = values[Point.LOAD, j] = load
-
-
-@njit(**NJIT_CALL)
-def try_step(system, level, row, begin, end, drive):
-    """Advance the motion by a step, unless the step must be halved.
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Arrays of the march, changed in place.
-    level : int
-        Level of the step, which lasts a whole step over 2^level.
-    row : int
-        Number of the whole step.
-    begin : float
-        Start of the step, as a fraction of the whole step.
-    end : float
-        End of the step, as a fraction of the whole step.
-    drive : tuple of float
-        Value, slope and second derivative of the drive at the start of the step [m s-2], per second and per second
-        squared.
-
-    Returns
-    -------
-    bool
-        False if a rigid point stops or is released within the step, or if Newton's method failed, and the step can be
-        halved. Then the motion has not advanced. True after a step, and also if no contact set was found, in which case
-        the counter `PRESENT_SLOT_INDEX` is -1.
-    """
-    points = system.points
-    shear = points.shear
-    values = points.values
-    options = system.options
-    levels = system.structure.responses.shape[0]
-    dt = options.step / (1 << level)
-    move_freely(system, level, drive, row, begin)
-
-    # Forces and increments of the pieces are extrapolated from the last steps by parabolas.
-    moves = system.ports.values
-    for k in range(points.stiffness.size):
-        rate = 3 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k]) + shear[Shear.FIRST, k]
-        shear[Shear.TRIAL, k] = dt * rate
-    if points.stiffness.size and not options.has_lists:
-        for p in range(moves.shape[1]):
-            force = moves[Port.FORCE, p]
-            moves[Port.FORCE, p] = 3 * (force - moves[Port.LAST, p]) + moves[Port.EARLIER, p]
-            moves[Port.EARLIER, p] = moves[Port.LAST, p]
-            moves[Port.LAST, p] = force
-
-    if options.has_lists:
-        for j in range(points.port.size):
-            if points.stiffness.size == 0:
-                values[Point.SPEED, j] = system.ports.values[Port.VELOCITY, points.port[j]]
-
-    # Loads that follow from the motion are iterated with it.
-    is_solved = False
-    for count in range(MAX_LOADS):
-        if options.has_loads:
-            change = find_loads(system, row, end, count > 0)
-            if change < 0:
-                system.sets.counters[PRESENT_SLOT_INDEX] = -1
-                return True
-            if count > 0 and change <= LOAD_RESIDUAL:
-                break
-        prepare_points(system, dt)
-        is_solved = solve_forces(system, level, dt)
-        if not options.has_loads:
-            break
-
-    # An event inside the step, or Newton's method without a solution, halves the step.
-    write_trial(system, level)
-    is_shortest = level == levels - 1
-    if options.has_events and find_event(
-        system, drive[0] + dt * (drive[1] + 0.5 * dt * drive[2]), is_shortest
-    ):
-        return False
-    if not is_solved:
-        if not is_shortest:
-            return False
-        system.totals[Total.UNSOLVED] += 1
-
-    commit(system, dt)
-    add_energies(system, level)
-    return True
-
-
-@njit(**NJIT_CALL)
-def add_energies(system, level):
-    """Add the work of the drive and the viscous loss of a step, and update the largest energy of the modes.
-
-    Both are forms of `system.structure.inputs`: 2 n modal coordinates and velocities at the start of the step, value, slope
-    and second derivative of the drive there, and n modal forces per mass. `Total.POWER` adds up |work| [J], the size to
-    which the error of the energy balance is compared.
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Arrays of the march, changed in place.
-    level : int
-        Level of the step, which lasts a whole step over 2^level.
-    """
-    structure = system.structure
-    totals = system.totals
-    inputs = structure.inputs
-    size = system.state.shape[1]
-
-    # Work is bilinear in drive and inputs, loss quadratic in the inputs.
-    work = 0.0
-    for i in range(3):
-        work += inputs[size + i] * sum_products(structure.work[level, i], inputs)
-    loss = 0.0
-    for i in range(inputs.size):
-        loss += inputs[i] * sum_products(structure.loss[level, i], inputs)
-
-    work -= totals[Total.REST]
-    totals[Total.WORK_IN] += work
-    totals[Total.POWER] += abs(work)
-    totals[Total.VISCOUS] += loss
-    totals[Total.STORED] = max(totals[Total.STORED], find_modal_energy(system))
-
-
-@njit(**NJIT_CALL)
-def write_sample(system, row, sample):
-    """Write forces, slips and energies at the present state to a sample; its first 2 n columns stay as they are.
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Arrays of the march, changed in place.
-    row : int
-        Number of the whole step.
-    sample : (k,) array
-        Sample, in the rows of `march_rows.Sample`; output.
-    """
-    ports = system.ports
-    points = system.points
-    structure = system.structure
-    flank = system.flank
-    size = system.state.shape[1]
-    n = size // 2
-    if system.options.has_events:
-        find_holds(system, system.state[0], structure.drive[row, 0])
-
-    # Displacements of the ports. Force and slip of a port are summed over its points from 0, and `ports.vector` is the sum
-    # of the weights of its slips.
-    energy = 0.0
-    first = size + Sample.PORTS
-    n_ports = ports.values.shape[1]
-    sample[size + Sample.SPRINGS] = 0.0
-    for p in range(n_ports):
-        slide = structure.path[row] if structure.path.size else 0.0
-        if n > 0:
-            slide = sum_products(ports.rows[p], system.state[0, :n])
-        ports.values[Port.SLIDE, p] = slide
-        sample[first + N_PORT_COLUMNS * p] = 0.0
-        sample[first + N_PORT_COLUMNS * p + 1] = 0.0
-        ports.vector[p] = 0.0
-
-    # Stored energy of pieces and points, and force and slip of each port.
-    for k in range(points.stiffness.size):
-        energy += 0.5 * points.stiffness[k] * points.shear[Shear.VALUE, k] ** 2
-    if system.options.has_only_bonds:
-        for p in range(n_ports):
-            sums = bonds.read_port(points, points.first[p], points.first[p + 1])
-            sample[first + N_PORT_COLUMNS * p] = sums.force
-            sample[first + N_PORT_COLUMNS * p + 1] = sums.slip
-            ports.vector[p] = sums.weight
-            energy += sums.energy
-    for j in range(0 if system.options.has_only_bonds else points.port.size):
-        p = points.port[j]
-        load = points.values[Point.END_LOAD, j]
-        state = read_point(system, j)
-        force = state.force
-
-        if points.is_spring[j]:
-            sample[size + Sample.SPRINGS] += state.energy
-            sample[first + N_PORT_COLUMNS * p] += force
-            continue
-        energy += state.energy
-        # The slip is a mean over the points, weighted by their friction limits (load times the first number of the law).
-        # A rigid point at rest has no force of its own: it carries the force that holds its port.
-        weight = load * points.numbers[1, j]
-        if is_held(points, p):
-            force = min(max(ports.values[Port.HOLD, p], -weight), weight)
-        sample[first + N_PORT_COLUMNS * p] += force
-        sample[first + N_PORT_COLUMNS * p + 1] += weight * (
-            points.values[Point.TOTAL, j] - state.stretch
-        )
-        ports.vector[p] += weight
-
-    # A port whose points are all without load does not stick at all.
-    for p in range(n_ports):
-        if ports.vector[p] > 0:
-            sample[first + N_PORT_COLUMNS * p + 1] /= ports.vector[p]
-        else:
-            sample[first + N_PORT_COLUMNS * p + 1] = ports.values[Port.SLIDE, p]
-    sample[size + Sample.LOAD] = structure.loads[row] if structure.loads.size else 0.0
-
-    if flank.size:
-        q = ports.values[Port.SLIDE, 0]
-        t = flanks.find_slope(flank, q)
-        length = np.sqrt(1 + t * t)
-        energy += flanks.find_energy(flank, q)
-        # The points know the path along the flank; the slip is the displacement less the stretch along it. The force of
-        # the port is V t + f sqrt(1 + t^2), with the vertical force V and the friction f along the flank.
-        stretch = points.values[Point.TOTAL, 0] - sample[first + 1]
-        sample[first + 1] = q - stretch / length
-        sample[first] = flank[Flank.VERTICAL] * t + sample[first] * length
-        sample[size + Sample.LOAD] = flank[Flank.VERTICAL]
-
-    # The contact carries its reference load and moment, less the derivatives of its energy by heave and pitch.
-    sample[size + Sample.ENERGY] = energy
-    heave = int(ports.contact[0])
-    if heave >= 0:
-        up = ports.values[Port.SLIDE, heave]
-        turn = ports.values[Port.SLIDE, int(ports.contact[1])]
-        contact = normal.compute_energy(
-            system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn
-        )
-        reference = system.sets.reference
-        sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD_INDEX] - contact[1], 0.0)
-        sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT_INDEX] - contact[2]
-        sample[size + Sample.CONTACT_ENERGY] = contact[0]
-        sample[size + Sample.HEAVE] = up
-        sample[size + Sample.PITCH] = turn
-
-
-@njit(cache=True, **NJIT_KERNEL)
-def march(system, steps, samples):
-    """March over a number of whole steps, or press the points to the normal contact of the present state for 0 steps.
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Changed in place.
-    steps : int
-        Number of steps.
-    samples : (steps + 1, k) array
-        Samples before each step and at the end (output).
-
-    Returns
-    -------
-    int
-        Number of steps done.
-    int
-        Status, named at the top of the module.
-    """
-    structure = system.structure
-    ports = system.ports
-    size = system.state.shape[1]
-    ticks = 1 << (structure.responses.shape[0] - 1)
-    dt = system.options.step
-    level = 0
-    if steps == 0 and ports.contact[0] >= 0:
-        press_at_rest(system)
-
-    for i in range(steps + 1):
-        write_sample(system, i, samples[i])
-        for k in range(size):
-            samples[i, k] = system.state[0, k]
-        output = sum_products(system.state[0], structure.modes[2])
-        if not abs(output) <= system.options.travel:
-            return i, EXCEEDS_TRAVEL if output == output else NOT_FINITE
-        if system.flank.size and system.flank[Flank.HAS_LIFTED] > 0:
-            return i, LEAVES_GROOVES
-        if i == steps:
-            break
-
-        # Mean forces of the ports in the whole step; `add_work` sums them over its parts.
-        first_column = size + Sample.PORTS + 2
-        for p in range(ports.values.shape[1]):
-            samples[i, first_column + N_PORT_COLUMNS * p] = 0.0
-
-        # A step with an event is halved; steps double again once they end on a tick of the longer one.
-        work = 0.0
-        tick = 0
-        while tick < ticks:
-            part = ticks >> level
-            tau = dt * tick / ticks
-            coefficients = structure.drive[i]
-            drive = (
-                coefficients[0] + tau * (coefficients[1] + 0.5 * tau * coefficients[2]),
-                coefficients[1] + tau * coefficients[2],
-                coefficients[2],
-            )
-            if not try_step(system, level, i, tick / ticks, (tick + part) / ticks, drive):
-                level += 1
-                continue
-            if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
-                return i, NO_CONTACT_SET
-
-            # Mean forces and work of the friction in the whole step.
-            work += add_work(system, samples[i], first_column, part / ticks)
-            tick += part
-            if level > 0 and tick % (2 * part) == 0:
-                level -= 1
-        samples[i, size + Sample.WORK] = work
-    return steps, DONE
-
-
 @njit(**NJIT_CALL)
 def add_work(system, sample, first_column, part):
     """Add the mean forces of a part of a step to a sample; return the friction work of this part [J].
@@ -1532,8 +786,7 @@ def add_work(system, sample, first_column, part):
     points = system.points
 
     # Work is mean force times increment, for points behind shear of the pieces too: their work includes the energy of the
-    # pieces. Ports of rigid points at rest are moved back by `commit`, which left this displacement in FREE, so that
-    # friction at rest does no work. All other laws keep their increment; their FREE has another meaning.
+    # pieces. Ports of rigid points at rest are moved back, so that friction at rest does no work.
     work = 0.0
     for j in range(points.port.size):
         if points.is_spring[j]:
@@ -1543,7 +796,7 @@ def add_work(system, sample, first_column, part):
         slide = ports.values[Port.INCREMENT, p]
         if points.numbers[0, j] == Law.COULOMB:
             force = ports.values[Port.FORCE, p]
-            slide -= ports.values[Port.FREE, p]
+            slide -= ports.values[Port.RETURN, p]
         # On a flank the points slide along it by ds = RATIO dq, so that their work f ds is that of the force RATIO f.
         if system.flank.size and p == 0:
             force *= system.flank[Flank.RATIO]
@@ -1556,3 +809,161 @@ def add_work(system, sample, first_column, part):
         work += force * ports.values[Port.INCREMENT, 0]
         sample[first_column] += force * part
     return work
+
+
+@njit(**NJIT_CALL)
+def solve_step(system, level, row, end):
+    """Solve port forces and shear increments of a step; return whether Newton's method found them.
+
+    Without a contact set the counter `PRESENT_SLOT_INDEX` becomes -1.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    row : int
+        Number of the whole step.
+    end : float
+        End of the step, as a fraction of the whole step.
+    """
+    points = system.points
+    options = system.options
+    moves = system.ports.values
+    dt = options.step / (1 << level)
+
+    # Behind pieces, forces are extrapolated from the last steps by parabolas.
+    if points.stiffness.size and not options.has_lists:
+        for p in range(moves.shape[1]):
+            force = moves[Port.FORCE, p]
+            moves[Port.FORCE, p] = 3 * (force - moves[Port.LAST, p]) + moves[Port.EARLIER, p]
+            moves[Port.EARLIER, p] = moves[Port.LAST, p]
+            moves[Port.LAST, p] = force
+    if options.has_lists and points.stiffness.size == 0:
+        for j in range(points.port.size):
+            points.values[Point.SPEED, j] = moves[Port.VELOCITY, points.port[j]]
+
+    # Loads that follow from the motion are iterated with it.
+    is_solved = False
+    for count in range(MAX_LOADS):
+        if options.has_loads:
+            change = find_loads(system, row, end, count > 0)
+            if change < 0:
+                system.sets.counters[PRESENT_SLOT_INDEX] = -1
+                return False
+            if count > 0 and change <= LOAD_RESIDUAL:
+                break
+        prepare_points(system, dt)
+        is_solved = solve_forces(system, level, dt)
+        if not options.has_loads:
+            break
+    return is_solved
+
+
+@njit(**NJIT_CALL)
+def sum_forces(system, p):
+    """Return the friction force [N] of the points of port p at the end of the last step."""
+    points = system.points
+    total = 0.0
+    for j in range(points.first[p], points.first[p + 1]):
+        total += read_point(system, j).force
+    return total
+
+
+@njit(**NJIT_CALL)
+def press_at_rest(system):
+    """Give the points the loads of the normal contact at the present state, while they rest."""
+    points = system.points
+    values = points.values
+    if system.ports.contact[0] < 0:
+        return
+    find_loads(system, 0, 0.0, False)
+    for j in range(points.port.size):
+        load = values[Point.END_LOAD, j]
+        if points.numbers[0, j] == Law.LIST:
+            lists.press_list(system.lists, j, load)
+        else:
+            press(points.numbers, points.memory, j, values[Point.START_LOAD, j], load)
+        values[Point.START_LOAD, j] = values[Point.LOAD, j] = load
+
+
+@njit(**NJIT_CALL)
+def find_path(points):
+    """Return the displacement [m] of the first point since the start, along its flank."""
+    return points.values[Point.TOTAL, 0]
+
+
+@njit(**NJIT_CALL)
+def read_points(system, forces, stretch, loads):
+    """Write friction force [N], elastic stretch [m] and load [N] of the points of the first port, all (m,).
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march.
+    forces, stretch, loads : (m,) array
+        Output.
+    """
+    for j in range(forces.size):
+        state = read_point(system, j)
+        forces[j] = state.force
+        stretch[j] = state.stretch
+        loads[j] = system.points.values[Point.END_LOAD, j]
+
+
+@njit(**NJIT_CALL)
+def write_ports(system, sample):
+    """Write force and slip of each port to a sample, and add the energies of the points.
+
+    The slip is a mean over the points, weighted by their friction limits (load times the first number of the law).
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march; `ports.vector` becomes the sum of the weights of each port.
+    sample : (k,) array
+        Sample, in the rows of `march_rows.Sample`; output.
+    """
+    ports = system.ports
+    points = system.points
+    size = system.state.shape[1]
+    first = size + Sample.PORTS
+    n_ports = ports.values.shape[1]
+    for p in range(n_ports):
+        sample[first + N_PORT_COLUMNS * p] = 0.0
+        sample[first + N_PORT_COLUMNS * p + 1] = 0.0
+        ports.vector[p] = 0.0
+
+    if system.options.has_only_bonds:
+        for p in range(n_ports):
+            sums = bonds.read_port(points, points.first[p], points.first[p + 1])
+            sample[first + N_PORT_COLUMNS * p] = sums.force
+            sample[first + N_PORT_COLUMNS * p + 1] = sums.slip
+            ports.vector[p] = sums.weight
+            sample[size + Sample.ENERGY] += sums.energy
+    for j in range(0 if system.options.has_only_bonds else points.port.size):
+        p = points.port[j]
+        state = read_point(system, j)
+        force = state.force
+        if points.is_spring[j]:
+            sample[size + Sample.SPRINGS] += state.energy
+            sample[first + N_PORT_COLUMNS * p] += force
+            continue
+        sample[size + Sample.ENERGY] += state.energy
+
+        # A rigid point at rest has no force of its own: it carries the force that holds its port.
+        weight = points.values[Point.END_LOAD, j] * points.numbers[1, j]
+        if ports.values[Port.HELD, p] > 0:
+            force = min(max(ports.values[Port.HOLD, p], -weight), weight)
+        sample[first + N_PORT_COLUMNS * p] += force
+        slip = points.values[Point.TOTAL, j] - state.stretch
+        sample[first + N_PORT_COLUMNS * p + 1] += weight * slip
+        ports.vector[p] += weight
+
+    # A port whose points are all without load does not stick at all.
+    for p in range(n_ports):
+        if ports.vector[p] > 0:
+            sample[first + N_PORT_COLUMNS * p + 1] /= ports.vector[p]
+        else:
+            sample[first + N_PORT_COLUMNS * p + 1] = ports.values[Port.SLIDE, p]

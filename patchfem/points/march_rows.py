@@ -25,7 +25,6 @@ class Point(IntEnum):
     - START_LOAD, LOAD, END_LOAD: load at start, middle and end of a step [N]
     - SLIDE, FORCE: slide in the step [m] and its path-mean force [N]
     - BY_SLIDE, BY_VELOCITY: derivatives of this force by the slide [N/m] and by the velocity at the end [N s/m]
-    - NODE_FORCE: normal forces of the nodes of a patch [N]
     - TOTAL: slide since the start [m]
     - TRIAL_SLIDE, TRIAL_FORCE: slide [m] and force [N] of the last trial of a list of bonds
     - SPEED, LAST_SPEED: extrapolated speed [m/s] of the next step, and speed of the last one
@@ -38,25 +37,29 @@ class Point(IntEnum):
     FORCE = 4
     BY_SLIDE = 5
     BY_VELOCITY = 6
-    NODE_FORCE = 7
-    TOTAL = 8
-    TRIAL_SLIDE = 9
-    TRIAL_FORCE = 10
-    SPEED = 11
-    LAST_SPEED = 12
+    TOTAL = 7
+    TRIAL_SLIDE = 8
+    TRIAL_FORCE = 9
+    SPEED = 10
+    LAST_SPEED = 11
 
 
 class Port(IntEnum):
-    """Rows of `Ports.values`.
+    """Rows of `Ports.values`; those from FIRST on belong to the march of `time_steps`.
 
     - SLIDE, VELOCITY: at the start of a step [m], [m/s]
     - FREE, FREE_VELOCITY: increment and velocity at the end without forces [m], [m/s]
     - FORCE: mean force of the step [N]
     - END_VELOCITY, INCREMENT: velocity at the end [m/s] and increment [m] under the assumed forces
-    - HOLD: force that holds the port at rest [N]
+    - HELD, HOLD: 1 if rigid friction holds the port at rest, and the force that does [N]
+    - RETURN: displacement of a port at rest that is taken back after the step [m]
     - SUM, BY_SLIDE, BY_VELOCITY: sums over the points of the port of their forces and of the slopes
     - BASE: force from which a line search starts [N]
-    - LAST, EARLIER: mean forces of the last step and of the step before it [N]
+    - LAST, EARLIER, FIRST: mean forces of the last three steps [N], the last one first
+    - DAMPING: weight of the force at the end of the step in the mean force, above 0 where the step does not resolve the
+      vibration of the port on its points
+    - STIFFNESS, VISCOSITY: of the points at rest [N/m], [N s/m]
+    - MOVE: increment of the points [m]
     """
 
     SLIDE = 0
@@ -73,6 +76,13 @@ class Port(IntEnum):
     BASE = 11
     LAST = 12
     EARLIER = 13
+    HELD = 14
+    RETURN = 15
+    FIRST = 16
+    DAMPING = 17
+    STIFFNESS = 18
+    VISCOSITY = 19
+    MOVE = 20
 
 
 class Shear(IntEnum):
@@ -172,12 +182,13 @@ class Points(NamedTuple):
       times the pressure of the lower piece at the place of the point
     - share (m,): fraction of the resultant, factor of the pressure, or the load [N] where it is constant
     - numbers (k, m), memory, trial (l, m): see `return_maps_kernels`
-    - values (13, m or number of nodes): see `Point`
+    - values (12, m): see `Point`
     - shapes (r, m), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
     - shear (8, r): see `Shear`
     - is_spring (m,): whether the point is a spring, whose work is not friction
     - place (m,): position of the point at rest [m]
     - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
+    - nodal (n,): forces of the nodes of a patch [N]
     """
 
     port: np.ndarray
@@ -194,6 +205,7 @@ class Points(NamedTuple):
     is_spring: np.ndarray
     place: np.ndarray
     pressure: np.ndarray
+    nodal: np.ndarray
 
 
 class Ports(NamedTuple):
@@ -204,7 +216,7 @@ class Ports(NamedTuple):
       that a constant force on another port takes away; C and G in `march_kernels`
     - grip (P, P): acceleration of a port that a force on another port takes away [1/kg]
     - redundant (P,): compliance of a port at rest relative to its own, which determines the forces of more ports than modes
-    - values (14, P): see `Port`
+    - values (21, P): see `Port`
     - matrix (P + r, P + r), vector, step (P + r,): Jacobian, residuals and step of Newton's method for P port forces and r
       shear coordinates
     - contact (11,): numbers of the heave and pitch ports (-1 for none), then the results of `path_mean` in the order of

@@ -1,38 +1,52 @@
-"""Functions of `normal_kernels` for a march without a patch whose pressure changes, which calls none of them (compiled)."""
+"""Functions of `normal_kernels` for a march without a patch whose pressure changes with heave and pitch (compiled).
+
+`find_motion_energy` and `find_holds` see to the modes; the others are not called.
+"""
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
+from .motion_kernels import find_modal_energy, solve_holds
 
 
 @njit(**NJIT_CALL)
-def find_set(sets, slot, approach, rotation):
-    """Return -1, the slot number that stands for no contact set.
-
-    The arguments are those of `press_kernels.find_set`, and are not used.
-    """
-    return -1
+def find_resultant(system, forces):
+    """Return -1, which stands for no contact set."""
+    return -1.0
 
 
 @njit(**NJIT_CALL)
-def press_state(sets, slot, approach, rotation, forces):
-    """Leave the forces as they are, because the march has no contact sets.
-
-    The arguments are those of `press_kernels.press_state`, and are not used.
-    """
+def add_residuals(system):
+    """Return 0 N, because no port of heave or pitch has a residual."""
+    return 0.0
 
 
 @njit(**NJIT_CALL)
-def compute_energy(sets, slot, heave, rotation):
-    """Return zeros for the energy of the contact and its derivatives by heave and rotation.
-
-    The arguments are those of `press_kernels.compute_energy`, and are not used.
-    """
-    return 0.0, 0.0, 0.0
+def add_slopes(system, level):
+    """Leave the Jacobian as it is."""
 
 
 @njit(**NJIT_CALL)
-def path_mean(sets, slot, heave, rotation, change, turn, out):
-    """Leave `out` as it is, because the march has no contact sets.
+def find_holds(system, state, drive):
+    """Write the forces that hold ports at rest at an instant to `Port.HOLD` [N].
 
-    The arguments are those of `press_path_kernels.path_mean`, and are not used.
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march; `ports.vector` has the forces of the points of each port.
+    state : (2 n,) array
+        Modal coordinates and velocities.
+    drive : float
+        Drive at this instant [m s-2].
     """
+    solve_holds(system, state, drive)
+
+
+@njit(**NJIT_CALL)
+def find_motion_energy(system):
+    """Return the energy of the modes [J]."""
+    return find_modal_energy(system)
+
+
+@njit(**NJIT_CALL)
+def write_sample(system, sample):
+    """Leave the sample as it is."""

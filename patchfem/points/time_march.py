@@ -140,15 +140,32 @@ class Motion:
 
 
 def load_kernels(contact: Contact, say=None):
-    """Return the compiled march with the parts that a contact needs: lists of bonds, contact sets."""
+    """Return the compiled march with the parts that a contact needs: its laws, lists of bonds, contact sets."""
     if contact.engine is not None:
-        return contact.engine.load_kernels(contact, say)
+        return load_loop(contact, "time_steps.march_kernels", {}, say)
     parts = {}
     if contact.bond_sum is None:
         parts["lists"] = "points.no_lists_kernels"
-    if contact.sets is None:
-        parts["normal"] = "points.no_normal_kernels"
-    return compiled.instantiate("points.march_kernels", parts, say)
+    return load_loop(contact, "points.march_kernels", parts, say)
+
+
+def load_loop(contact: Contact, module: str, parts: dict[str, str], say=None):
+    """Return the compiled loop of a march that solves steps by a module.
+
+    Parameters
+    ----------
+    contact : Contact
+        Contact points, whose normal contact decides whether the march has contact sets.
+    module : str
+        Kernel module of the steps.
+    parts : dict of str
+        Modules that replace parts of this module.
+    say : callable, optional
+        Callback for a line of text.
+    """
+    normal = {} if contact.sets is not None else {"normal": "points.no_normal_kernels"}
+    steps = compiled.instantiate(module, parts | normal, say)
+    return compiled.instantiate("points.loop_kernels", normal | {"steps": steps}, say)
 
 
 # ---- arrays of a march
@@ -283,7 +300,7 @@ def make_system(
     # Compliance of the ports: rows . response to modal forces . rows^T.
     by_force = responses.motion[:, :, 2 * n + 3 :]
     compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
-    points = _make_points(contact, 0 if contact.sets is None else contact.sets.x.size)
+    points = _make_points(contact)
     lists = _make_lists(contact, points)
 
     state = np.zeros((3, 2 * n))
@@ -364,7 +381,7 @@ def _find_redundant(rows, points: Points) -> np.ndarray:
     return REDUNDANT / np.maximum(share, MIN_STRENGTH)
 
 
-def _make_points(contact: Contact, n_nodes: int) -> Points:
+def _make_points(contact: Contact) -> Points:
     """Return the arrays of all points."""
     # Numbers, memory and loads of the laws of all points.
     laws = [point_set.law for point_set in contact.point_sets]
@@ -373,8 +390,8 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     n_memory = max([N_MEMORY, *(len(law.memory) for law in laws)])
     memory = _join_columns(n_memory, [law.memory for law in laws])
     loads = np.hstack([np.zeros(0), *(law.load + 0 * law.numbers[0] for law in laws)])
-    values = np.zeros((len(Point), max(loads.size, n_nodes)))
-    values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], : loads.size] = loads
+    values = np.zeros((len(Point), loads.size))
+    values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD]] = loads
 
     resultant = contact.preload
     if contact.grooves is not None:
@@ -404,7 +421,9 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     shear = np.zeros((len(Shear), stiffness.size))
     if stiffness.size:
         shear[Shear.SCALE] = 1 / np.sqrt((shapes**2).mean(axis=1))
-    n_moving = 0 if contact.sets is None else 2  # ports of heave and pitch have no points
+    # Ports of heave and pitch have no points.
+    n_moving = 0 if contact.sets is None else 2
+    n_nodes = 0 if contact.sets is None else contact.sets.x.size
     return Points(
         np.repeat(np.arange(len(counts)), counts),
         np.cumsum([0, *counts, *[0] * n_moving]),
@@ -420,6 +439,7 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         np.repeat([point_set.is_spring for point_set in contact.point_sets], counts).astype(bool),
         position,
         np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
+        np.zeros(n_nodes),
     )
 
 
@@ -694,8 +714,7 @@ class March:
         time = (self.done + self.shift) * self.step
         motion = (time, float(row @ sample[:n]), *remainder[Sample.PORTS : Sample.PORTS + 2])
         motion = (*motion, remainder[Sample.HEAVE], remainder[Sample.PITCH])
-        make = make_snapshot if self.contact.engine is None else self.contact.engine.make_snapshot
-        return make(self.kernels, self.system, motion)
+        return make_snapshot(self.kernels, self.system, self.contact.point_sets[0], motion)
 
     def find_ledger(self, sample, energies) -> dict[str, float]:
         """Return energies [J] and counters by name at a sample of the present state, with the sums `Energy` up to it."""
@@ -756,8 +775,8 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     return np.where((losses < 0) & (losses > -noise), 0.0, losses)
 
 
-def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> Snapshot:
-    """Return the state of the points on the first port; `motion` has the first six fields of Snapshot.
+def make_snapshot(kernels, system: System, point_set, motion: tuple[float, ...]) -> Snapshot:
+    """Return the state of the points on the first port.
 
     Parameters
     ----------
@@ -765,30 +784,24 @@ def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> Snapsho
         Compiled march.
     system : march_rows.System
         Arrays of the march.
+    point_set : contacts.PointSet
+        Points on the first port.
     motion : tuple
         The first six fields of Snapshot.
     """
-    points = system.points
-    count = points.port.size
-    read = kernels.read_points
+    count = np.size(point_set.law.numbers[0])
     forces = np.zeros(count)
     stretch = np.zeros(count)
-    read(system, forces, stretch)
-    values = points.values
-    n_own = int(points.first[1])
+    loads = np.zeros(count)
+    kernels.read_points(system, forces, stretch, loads)
+
     # The pieces at rest under the present forces; the march brings only their means over a step into equilibrium.
-    shapes = points.shapes[:, :n_own]
-    bend = (shapes @ forces[:n_own] / points.stiffness) @ shapes
-    has_nodes = system.ports.contact[0] >= 0
-    return Snapshot(
-        *motion,
-        forces[:n_own],
-        stretch[:n_own],
-        bend,
-        values[Point.END_LOAD, :n_own].copy(),
-        values[Point.NODE_FORCE, : system.sets.x.size].copy() if has_nodes else np.zeros(0),
-        float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0,
-    )
+    bend = np.zeros(count)
+    if point_set.shear is not None:
+        shape = np.asarray(point_set.shear.shape)
+        bend = shape @ (forces @ shape / point_set.shear.stiffness)
+    vertical = float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0
+    return Snapshot(*motion, forces, stretch, bend, loads, system.points.nodal.copy(), vertical)
 
 
 def march(

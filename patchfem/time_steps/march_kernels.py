@@ -26,46 +26,38 @@ of the step is explicit in A. A port at rest is brought back to its place after 
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from ..contact.set_arrays import PRESENT_SLOT_INDEX, REFERENCE_LOAD_INDEX, REFERENCE_MOMENT_INDEX
 from ..points import flanks_kernels as flanks
 from ..points import normal_kernels as normal
-from ..points.march_kernels import (
-    add_energies,
-    find_modal_energy,
-    interpolate_pressure,
-    move_freely,
-    solve_linear,
-    sum_products,
-    write_trial,
-)
 from ..points.march_rows import (
-    DONE,
-    EXCEEDS_TRAVEL,
-    LEAVES_GROOVES,
-    LOWER,
     N_PORT_COLUMNS,
-    NO_CONTACT_SET,
-    NOT_FINITE,
     RESIDUAL,
     Flank,
+    Port,
     Sample,
     Shear,
     Total,
 )
+from ..points.motion_kernels import (
+    TINY_LOAD,
+    advance_shear,
+    find_point_load,
+    find_port_residual,
+    find_resultant,
+    move_ports,
+    solve_linear,
+    store_base,
+    subtract_step,
+)
 from .laws_kernels import slide_points
-from .step_rows_kernels import VECTOR, WIDTH, Law, Port, Step, Value
+from .step_rows_kernels import VECTOR, WIDTH, Law, Step, Value
 
 MAX_NEWTON_ITERATIONS = 60  # Newton iterations of a step
 MAX_CUTS = 8  # trials of a line search, each with a third of the step before
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
 STALLED = 1e3  # largest residual of such a step relative to RESIDUAL
-INCREMENT_ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
-CONTACT_WEIGHT = (
-    10.0  # weight of the residuals of normal contact, which would add up as it loses no energy
-)
 TINY = 1e-300  # m, in place of no path
 
 
@@ -191,21 +183,15 @@ def write_forces(system, level, step):
     ports = system.ports
     points = system.points
     moves = ports.values
-    compliance = ports.compliance[level]
     flank = system.flank
     n_ports = moves.shape[1]
+    move_ports(system, level)
     for p in range(n_ports):
-        dq = moves[Port.FREE, p]
-        v = moves[Port.FREE_VELOCITY, p]
-        for k in range(n_ports):
-            dq -= compliance[0, p, k] * moves[Port.FORCE, k]
-            v -= compliance[1, p, k] * moves[Port.FORCE, k]
+        dq = moves[Port.INCREMENT, p]
         damping = moves[Port.DAMPING, p]
-        moves[Port.INCREMENT, p] = dq
-        moves[Port.END_VELOCITY, p] = v
-        moves[Port.MOVE, p] = (
-            dq if damping == 0.0 else (1 - damping) * dq + damping * step.duration * v
-        )
+        if damping > 0.0:
+            dq = (1 - damping) * dq + damping * step.duration * moves[Port.END_VELOCITY, p]
+        moves[Port.MOVE, p] = dq
     if flank.size:
         flanks.climb(flank, moves[Port.SLIDE, 0], moves[Port.MOVE, 0], step.duration)
     change = 0.0
@@ -238,17 +224,9 @@ def write_forces(system, level, step):
         moves[Port.BY_SLIDE, p] = by_slide
         moves[Port.BY_VELOCITY, p] = by_velocity
 
-    # On a flank, F = V t + r f and dF/dq = K + r^2 df/ds with the ratio r of path to displacement.
     if flank.size:
-        flank[Flank.TRIAL_FORCE] = moves[Port.SUM, 0]
-        ratio = flank[Flank.RATIO]
-        vertical = flank[Flank.TRIAL_VERTICAL] * flank[Flank.SLOPE]
-        stiffness = flanks.find_stiffness(
-            flank, moves[Port.SLIDE, 0], moves[Port.MOVE, 0], step.duration
-        )
-        moves[Port.SUM, 0] = vertical + ratio * moves[Port.SUM, 0]
-        moves[Port.BY_SLIDE, 0] = stiffness + ratio * ratio * moves[Port.BY_SLIDE, 0]
-        moves[Port.BY_VELOCITY, 0] *= ratio * ratio
+        flanks.add_climb(flank, moves, moves[Port.MOVE, 0], step.duration)
+        moves[Port.BY_VELOCITY, 0] *= flank[Flank.RATIO] ** 2
     if system.structure.path.size:
         moves[Port.FORCE, 0] = moves[Port.SUM, 0]
     # Loads under heave and pitch are consistent with the increments of this trial.
@@ -322,36 +300,13 @@ def write_residual(system, level):
     vector = ports.vector
     n_ports = moves.shape[1]
     size = system.options.scale
-    heave = int(ports.contact[0])
     for p in range(n_ports):
         vector[p] = moves[Port.SUM, p] - moves[Port.FORCE, p]
         vector[p] -= ports.redundant[p] * moves[Port.FORCE, p]
         size = max(size, abs(moves[Port.FORCE, p]))
-
-    # Heave and pitch carry the change of load and moment of the contact.
-    if heave >= 0:
-        pitch = int(ports.contact[1])
-        normal.path_mean(
-            system.sets,
-            system.sets.counters[PRESENT_SLOT_INDEX],
-            moves[Port.SLIDE, heave],
-            moves[Port.SLIDE, pitch],
-            moves[Port.INCREMENT, heave],
-            moves[Port.INCREMENT, pitch],
-            ports.contact[2:11],
-        )
-        vector[heave] += ports.contact[2]
-        vector[pitch] += ports.contact[3]
-        size = max(size, abs(ports.contact[2]))
-
-    largest = 0.0
-    tolerance = RESIDUAL * size
-    for p in range(n_ports):
-        own = ports.compliance[level, 0, p, p]
-        noise = INCREMENT_ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
-        weight = CONTACT_WEIGHT if p >= heave >= 0 else 1.0
-        if own > 0 or p != 0 or not system.structure.path.size:
-            largest = max(largest, weight * abs(vector[p]) / (tolerance + noise))
+    if ports.contact[0] >= 0:
+        size = max(size, normal.add_residuals(system))
+    largest = find_port_residual(system, level, size)
 
     # kappa (b + db) = shapes^T f1
     shear = points.shear
@@ -361,7 +316,7 @@ def write_residual(system, level):
             for block in range(points.first[p], points.first[p + 1]):
                 residual -= sum_shape(points, k, block, Value.END)
             vector[n_ports + k] = residual
-            largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / tolerance)
+            largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / (RESIDUAL * size))
     return largest
 
 
@@ -425,15 +380,8 @@ def write_matrix(system, level, step):
                 matrix[p, k] = -slope * compliance[1, p, k] if k != p else 0.0
         matrix[p, p] -= 1.0 + ports.redundant[p]
 
-    # The contact couples heave and pitch by the derivatives of its load and moment (`ports.contact[7:11]`).
-    heave = int(ports.contact[0])
-    if heave >= 0:
-        pitch = int(ports.contact[1])
-        for i in range(2):
-            p = heave if i == 0 else pitch
-            for k in range(n_ports):
-                change = ports.contact[7 + 2 * i] * compliance[0, heave, k]
-                matrix[p, k] -= change + ports.contact[8 + 2 * i] * compliance[0, pitch, k]
+    if ports.contact[0] >= 0:
+        normal.add_slopes(system, level)
 
 
 @njit(**NJIT_CALL)
@@ -506,10 +454,6 @@ def solve_forces(system, level, step):
         Duration and formula of the velocity.
     """
     ports = system.ports
-    moves = ports.values
-    shear = system.points.shear
-    n_ports = moves.shape[1]
-    n_shear = system.points.stiffness.size
     change = write_forces(system, level, step)
     if change < 0:
         return False
@@ -525,19 +469,13 @@ def solve_forces(system, level, step):
             ports.step[i] = ports.vector[i]
         if not solve_linear(ports.matrix, ports.step, ports.vector.size):
             return False
-        for p in range(n_ports):
-            moves[Port.BASE, p] = moves[Port.FORCE, p]
-        for k in range(n_shear):
-            shear[Shear.BASE, k] = shear[Shear.TRIAL, k]
+        store_base(system)
 
         # The line search accepts a step that decreases the largest residual.
         fraction = 1.0
         before = residual
         for _ in range(MAX_CUTS):
-            for p in range(n_ports):
-                moves[Port.FORCE, p] = moves[Port.BASE, p] - fraction * ports.step[p]
-            for k in range(n_shear):
-                shear[Shear.TRIAL, k] = shear[Shear.BASE, k] - fraction * ports.step[n_ports + k]
+            subtract_step(system, fraction)
             change = write_forces(system, level, step)
             if change < 0:
                 return False
@@ -569,148 +507,52 @@ def find_loads(system, row, fraction, is_solved):
     """
     ports = system.ports
     points = system.points
-    loads = system.structure.loads
-    flank = system.flank
-    moves = ports.values
-    heave = int(ports.contact[0])
-    # The resultant follows from the normal contact, the flank or a prescribed history.
-    resultant = 0.0
-    if heave >= 0:
-        pitch = int(ports.contact[1])
-        up = moves[Port.SLIDE, heave] + moves[Port.INCREMENT, heave]
-        turn = moves[Port.SLIDE, pitch] + moves[Port.INCREMENT, pitch]
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
-        if slot < 0:
+    if ports.contact[0] >= 0:
+        resultant = normal.find_resultant(system, points.nodal)
+        if resultant < 0:
             return -1.0
-        normal.press_state(system.sets, slot, -up, turn, points.nodal)
-        resultant = max(
-            system.sets.reference[REFERENCE_LOAD_INDEX]
-            - normal.compute_energy(system.sets, slot, up, turn)[1],
-            0.0,
-        )
-    elif flank.size:
-        if is_solved:
-            q = moves[Port.SLIDE, 0] + moves[Port.INCREMENT, 0]
-            flank[Flank.NORMAL] = flanks.find_normal(
-                flank, q, flank[Flank.TRIAL_FORCE], points.numbers[0, 0]
-            )
-        resultant = flank[Flank.NORMAL]
-    elif loads.size:
-        resultant = loads[row] + fraction * (loads[row + 1] - loads[row])
+    else:
+        resultant = find_resultant(system, row, fraction, points.numbers[0, 0], is_solved)
 
-    # Every point carries its share of the resultant, its nodal force or the pressure of the lower piece at its place.
     change = 0.0
-    total = TINY
+    total = TINY_LOAD
     for block in range(points.law.size):
         if points.is_spring[points.port[block]]:
             continue
         values = points.values[block]
         for j in range(points.count[block]):
-            load = points.share[block, j] * resultant
-            if points.node[block, j] >= 0:
-                load = points.nodal[points.node[block, j]]
-            elif points.node[block, j] == LOWER:
-                x = points.place[block, j] + values[Value.TOTAL + j] + values[Value.SLIDE + j]
-                load = points.share[block, j] * interpolate_pressure(x, points.pressure)
+            x = points.place[block, j] + values[Value.TOTAL + j] + values[Value.SLIDE + j]
+            load = find_point_load(points, (block, j), x, resultant)
             change = max(change, abs(load - values[Value.END_LOAD + j]))
             values[Value.END_LOAD + j] = load
             total += load
-    return 0.0 if loads.size and heave < 0 else change / total
+    is_prescribed = system.structure.loads.size and ports.contact[0] < 0
+    return 0.0 if is_prescribed else change / total
 
 
 @njit(**NJIT_CALL)
-def is_at_rest(points, p):
-    """Return whether a port is held at rest by rigid friction at the end of the last step."""
+def is_held(points, p):
+    """Return whether port p is held at rest by rigid friction at the end of the last step."""
     block = points.first[p]
     is_rigid = block < points.first[p + 1] and points.law[block] == Law.COULOMB
     return is_rigid and points.values[block, Value.STRETCH] > 0
 
 
 @njit(**NJIT_CALL)
-def find_holds(system, drive):
-    """Write the forces that hold rigid ports at rest at the present instant, to `Port.HOLD` [N].
+def find_event(system, drive, is_shortest):
+    """Return whether a rigid port stops, is reversed or begins to slip in the trial step, which can then be halved.
 
-    Other ports receive the force of their points and of the normal contact. `drive` is its value [m s-2].
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march.
+    drive : float
+        Drive at the end of the step [m s-2], which is not used.
+    is_shortest : bool
+        Whether the step cannot be halved.
     """
-    ports = system.ports
-    points = system.points
-    structure = system.structure
-    state = system.state[0]
-    n = structure.modes.shape[1]
-    n_ports = ports.values.shape[1]
-    for p in range(n_ports):
-        total = 0.0
-        if is_at_rest(points, p):
-            # Ports at rest have no acceleration: grip . hold = acceleration without their forces.
-            for i in range(n):
-                acceleration = -structure.modes[1, i] * drive - structure.modes[0, i] * state[i]
-                acceleration -= sum_products(structure.damping[i], state[n:])
-                total += ports.rows[p, i] * acceleration
-        else:
-            for block in range(points.first[p], points.first[p + 1]):
-                for j in range(points.count[block]):
-                    total += points.values[block, Value.START + j]
-        ports.vector[p] = total
-
-    heave = int(ports.contact[0])
-    if heave >= 0:
-        pitch = int(ports.contact[1])
-        up = sum_products(ports.rows[heave], state[:n])
-        turn = sum_products(ports.rows[pitch], state[:n])
-        slot = system.sets.counters[PRESENT_SLOT_INDEX]
-        energy = normal.compute_energy(system.sets, slot, up, turn)
-        ports.vector[heave] += energy[1]
-        ports.vector[pitch] += energy[2]
-    solve_held(system)
-    for p in range(n_ports):
-        ports.values[Port.HOLD, p] = ports.vector[p]
-
-
-@njit(**NJIT_CALL)
-def solve_held(system):
-    """Solve grip . x = vector for the ports at rest, in place in `ports.vector`.
-
-    `grip` is the acceleration of ports per force. The entries of the other ports are given values of x.
-    """
-    ports = system.ports
-    n_ports = ports.values.shape[1]
-    for p in range(n_ports):
-        is_held = is_at_rest(system.points, p)
-        for k in range(n_ports):
-            ports.matrix[p, k] = ports.grip[p, k] if is_held else 0.0
-        if is_held:
-            ports.matrix[p, p] *= 1 + ports.redundant[p]
-        else:
-            ports.matrix[p, p] = 1.0
-    solve_linear(ports.matrix, ports.vector, n_ports)
-
-
-@njit(**NJIT_CALL)
-def return_ports(system):
-    """Bring rigid ports at rest back to their places and to rest, by the smallest change of the modes.
-
-    A constant force over the step only makes their velocity vanish at its end. `Port.RETURN` has their displacements.
-    """
-    ports = system.ports
-    state = system.state[0]
-    n = state.size // 2
-    n_ports = ports.rows.shape[0]
-    for first in (0, n):
-        for p in range(n_ports):
-            ports.vector[p] = 0.0
-            if is_at_rest(system.points, p):
-                ports.vector[p] = ports.values[Port.RETURN, p]
-                if first > 0:
-                    ports.vector[p] = sum_products(ports.rows[p], state[n:])
-        solve_held(system)
-        for p in range(n_ports):
-            for i in range(n):
-                state[first + i] -= ports.rows[p, i] * ports.vector[p] / system.options.mass
-
-
-@njit(**NJIT_CALL)
-def has_event(system):
-    """Return whether a rigid port stops, is reversed or begins to slip in the trial step."""
+    if is_shortest:
+        return False
     points = system.points
     moves = system.ports.values
     for block in range(points.law.size):
@@ -731,12 +573,13 @@ def has_event(system):
 
 @njit(**NJIT_CALL)
 def commit(system, duration):
-    """Advance memories, shear coordinates and loads after an accepted step of a `duration` [s]."""
-    ports = system.ports
+    """Advance memories, shear coordinates and loads after an accepted step of a `duration` [s].
+
+    `Port.RETURN` of a rigid port becomes the displacement that is taken back because it was at rest, and `Total.REST` the
+    work of the drive on these displacements.
+    """
     points = system.points
-    moves = ports.values
-    flank = system.flank
-    is_any_rigid = False
+    moves = system.ports.values
     rest = 0.0
     for block in range(points.law.size):
         values = points.values[block]
@@ -744,7 +587,6 @@ def commit(system, duration):
             p = points.port[block]
             moves[Port.RETURN, p] = moves[Port.INCREMENT, p] - values[Value.SLIDE]
             rest += moves[Port.FORCE, p] * moves[Port.RETURN, p]
-            is_any_rigid = True
             limit = points.numbers[block, WIDTH] * values[Value.END_LOAD]
             v = moves[Port.END_VELOCITY, p]
             values[Value.VELOCITY] = 0.0 if values[Value.STRETCH] > 0 else v
@@ -761,96 +603,13 @@ def commit(system, duration):
         for k in range(points.n_memory[block]):
             memory[k] = trial[k]
 
-    # The rates of the last three steps extrapolate those of the next one.
-    shear = points.shear
-    for k in range(points.stiffness.size):
-        shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
-        shear[Shear.FIRST, k] = shear[Shear.EARLIER, k]
-        shear[Shear.EARLIER, k] = shear[Shear.LAST, k]
-        shear[Shear.LAST, k] = shear[Shear.TRIAL, k] / duration
+    system.totals[Total.REST] = rest
+    advance_shear(points, duration)
     points.clock[0] = duration
     for p in range(moves.shape[1]):
         moves[Port.FIRST, p] = moves[Port.EARLIER, p]
         moves[Port.EARLIER, p] = moves[Port.LAST, p]
         moves[Port.LAST, p] = moves[Port.FORCE, p]
-
-    # Rigid ports at rest come back, which may also move the holder.
-    for i in range(system.state.shape[1]):
-        system.state[0, i] = system.state[2, i]
-    energy = find_motion_energy(system)
-    if is_any_rigid and system.sets.counters[PRESENT_SLOT_INDEX] >= 0:
-        return_ports(system)
-        rest += energy - find_motion_energy(system)
-        if ports.contact[0] >= 0:
-            press_at_rest(system)
-    system.totals[Total.REST] = rest
-
-    # The mean of the rise speed over the step is slope dq/dt.
-    if flank.size:
-        rise = 2 * flank[Flank.SLOPE] * moves[Port.INCREMENT, 0] / duration
-        flank[Flank.RISE_SPEED] = rise - flank[Flank.RISE_SPEED]
-        flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL]
-        if flank[Flank.LIFTED_MASS] > 0 and not flank[Flank.VERTICAL] > 0:
-            flank[Flank.HAS_LIFTED] = 1.0
-        flank[Flank.FORCE] = 0.0
-        for block in range(points.law.size):
-            for j in range(points.count[block]):
-                flank[Flank.FORCE] += points.values[block, Value.START + j]
-
-
-@njit(**NJIT_CALL)
-def find_motion_energy(system):
-    """Return the energy of the modes and of the normal contact [J], and find the present contact set."""
-    state = system.state[0]
-    ports = system.ports
-    n = state.size // 2
-    energy = find_modal_energy(system)
-    heave = int(ports.contact[0])
-    if heave >= 0:
-        up = sum_products(ports.rows[heave], state[:n])
-        turn = sum_products(ports.rows[int(ports.contact[1])], state[:n])
-        slot = normal.find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
-        system.sets.counters[PRESENT_SLOT_INDEX] = slot
-        if slot >= 0:
-            energy += normal.compute_energy(system.sets, slot, up, turn)[0]
-    return energy
-
-
-@njit(**NJIT_CALL)
-def press_at_rest(system):
-    """Give the points the loads of the present state while they rest; write their forces and energies."""
-    ports = system.ports
-    points = system.points
-    n = system.state.shape[1] // 2
-    if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
-        return  # the march ends without a contact set
-    if ports.contact[0] >= 0:
-        for i in range(2):
-            p = int(ports.contact[i])
-            ports.values[Port.SLIDE, p] = sum_products(ports.rows[p], system.state[0, :n])
-            ports.values[Port.INCREMENT, p] = 0.0
-        find_loads(system, 0, 0.0, False)
-
-    step = Step(0.0, 0.0, 0.0)
-    for block in range(points.law.size):
-        values = points.values[block]
-        for j in range(points.count[block]):
-            values[Value.SLIDE + j] = 0.0
-        if points.law[block] != Law.COULOMB:
-            slide_points(
-                points.law[block],
-                points.numbers[block],
-                points.memory[block],
-                points.trial[block],
-                values,
-                points.count[block],
-                step,
-            )
-            for k in range(points.n_memory[block]):
-                points.memory[block, k] = points.trial[block, k]
-        for j in range(points.count[block]):
-            values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
-            values[Value.START + j] = values[Value.END + j]
 
 
 @njit(**NJIT_CALL)
@@ -886,164 +645,6 @@ def find_order(system):
 
 
 @njit(**NJIT_CALL)
-def try_step(system, level, row, begin, end, drive):
-    """Advance the motion by a step, unless the step must be halved.
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Arrays of the march, changed in place.
-    level : int
-        Level of the step, which lasts a whole step over 2^level.
-    row : int
-        Number of the whole step.
-    begin : float
-        Start of the step, as a fraction of the whole step.
-    end : float
-        End of the step, as a fraction of the whole step.
-    drive : tuple of float
-        Value, slope and second derivative of the drive at the start of the step [m s-2], per second and per second
-        squared.
-
-    Returns
-    -------
-    bool
-        False if Newton's method failed or rigid friction jumps, and the step can be halved. Then the motion has
-        not advanced. True after a step, and also if no contact set was found, in which case the counter
-        `PRESENT_SLOT_INDEX` is -1.
-    """
-    points = system.points
-    shear = points.shear
-    options = system.options
-    moves = system.ports.values
-    duration = options.step / (1 << level)
-    move_freely(system, level, drive, row, begin)
-    find_damping(system, level)
-
-    # Velocity of order 2 from two increments (BDF2), of order 1 in the first step
-    last = points.clock[0]
-    ratio = duration / last if last > 0 else 0.0
-    part = find_order(system) * ratio / (1 + ratio)
-    step = Step(duration, (1 + part) / duration, part * ratio / duration)
-
-    # Forces and increments of the pieces are extrapolated from the last steps by parabolas.
-    for k in range(points.stiffness.size):
-        slope = 3 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k]) + shear[Shear.FIRST, k]
-        shear[Shear.TRIAL, k] = duration * slope
-    for p in range(moves.shape[1]):
-        force = 3 * (moves[Port.LAST, p] - moves[Port.EARLIER, p]) + moves[Port.FIRST, p]
-        moves[Port.FORCE, p] = force
-
-    if options.has_loads and system.structure.loads.size:
-        find_loads(system, row, end, False)
-    is_solved = solve_forces(system, level, step)
-
-    # A step without a solution, or in which rigid friction jumps, is halved.
-    can_halve = level < system.structure.responses.shape[0] - 1
-    if can_halve and (not is_solved or has_event(system)):
-        return False
-    if not is_solved:
-        system.totals[Total.UNSOLVED] += 1
-    write_trial(system, level)
-    commit(system, duration)
-    add_energies(system, level)
-    return True
-
-
-@njit(**NJIT_CALL)
-def write_sample(system, row, sample):
-    """Write forces, slips and energies at the present state to a sample; its first 2 n columns stay as they are.
-
-    Parameters
-    ----------
-    system : march_rows.System
-        Arrays of the march, changed in place.
-    row : int
-        Number of the whole step.
-    sample : (k,) array
-        Sample, in the rows of `march_rows.Sample`; output.
-    """
-    ports = system.ports
-    points = system.points
-    structure = system.structure
-    flank = system.flank
-    size = system.state.shape[1]
-    n = size // 2
-    if system.options.has_events:
-        find_holds(system, structure.drive[row, 0])
-
-    # Stored energy of the pieces; displacement, force, slip and energy of each port. The slip is a mean over the points,
-    # weighted by their friction limits (load times the first number of the law).
-    energy = 0.0
-    for k in range(points.stiffness.size):
-        energy += 0.5 * points.stiffness[k] * points.shear[Shear.VALUE, k] ** 2
-    springs = 0.0
-    n_ports = ports.values.shape[1]
-    for p in range(n_ports):
-        slide = structure.path[row] if structure.path.size else 0.0
-        if n > 0:
-            slide = sum_products(ports.rows[p], system.state[0, :n])
-        ports.values[Port.SLIDE, p] = slide
-        force = 0.0
-        slip = 0.0
-        weights = 0.0
-        stored = 0.0
-        for block in range(points.first[p], points.first[p + 1]):
-            values = points.values[block]
-            numbers = points.numbers[block]
-            is_rigid = points.law[block] == Law.COULOMB
-            n_lanes = (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
-            for j in range(n_lanes):
-                weight = values[Value.END_LOAD + j] * numbers[j]
-                elastic = 0.0 if is_rigid else values[Value.STRETCH + j]
-                force += values[Value.START + j]
-                slip += weight * (values[Value.TOTAL + j] - elastic)
-                weights += weight
-                stored += values[Value.ENERGY + j]
-            if is_rigid and values[Value.STRETCH] > 0:
-                force = min(max(ports.values[Port.HOLD, p], -weights), weights)
-        column = size + Sample.PORTS + N_PORT_COLUMNS * p
-        sample[column] = force
-        # A port whose points are all without load does not stick at all.
-        sample[column + 1] = slip / weights if weights > 0 else slide
-        if points.is_spring[p]:
-            springs += stored
-            sample[column + 1] = 0.0
-        else:
-            energy += stored
-    sample[size + Sample.SPRINGS] = springs
-    sample[size + Sample.LOAD] = structure.loads[row] if structure.loads.size else 0.0
-
-    # The points know the path along the flank; the slip is the displacement less the stretch along it. The force of the
-    # port is V t + f sqrt(1 + t^2), with the vertical force V and the friction f along the flank.
-    if flank.size:
-        first = size + Sample.PORTS
-        q = ports.values[Port.SLIDE, 0]
-        t = flanks.find_slope(flank, q)
-        length = np.sqrt(1 + t * t)
-        energy += flanks.find_energy(flank, q)
-        stretch = points.values[0, Value.TOTAL] - sample[first + 1]
-        sample[first + 1] = q - stretch / length
-        sample[first] = flank[Flank.VERTICAL] * t + sample[first] * length
-        sample[size + Sample.LOAD] = flank[Flank.VERTICAL]
-
-    # The contact carries its reference load and moment, less the derivatives of its energy by heave and pitch.
-    sample[size + Sample.ENERGY] = energy
-    heave = int(ports.contact[0])
-    if heave >= 0:
-        up = ports.values[Port.SLIDE, heave]
-        turn = ports.values[Port.SLIDE, int(ports.contact[1])]
-        slot = system.sets.counters[PRESENT_SLOT_INDEX]
-        contact = normal.compute_energy(system.sets, slot, up, turn)
-        reference = system.sets.reference
-        sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD_INDEX] - contact[1], 0.0)
-        sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT_INDEX] - contact[2]
-        sample[size + Sample.CONTACT_ENERGY] = contact[0]
-        sample[size + Sample.HEAVE] = up
-        sample[size + Sample.PITCH] = turn
-
-
-@njit(**NJIT_CALL)
 def add_work(system, sample, first_column, part):
     """Add the mean forces of a part of a step to a sample; return the friction work of this part [J].
 
@@ -1073,72 +674,148 @@ def add_work(system, sample, first_column, part):
     return work
 
 
-@njit(cache=True, **NJIT_KERNEL)
-def march(system, steps, samples):
-    """March over a number of whole steps, or read the points at the present state for 0 steps.
+@njit(**NJIT_CALL)
+def solve_step(system, level, row, end):
+    """Solve port forces and shear increments of a step; return whether Newton's method found them.
 
     Parameters
     ----------
     system : march_rows.System
-        Changed in place.
-    steps : int
-        Number of steps.
-    samples : (steps + 1, k) array
-        Samples before each step and at the end (output).
-
-    Returns
-    -------
-    int
-        Number of steps done.
-    int
-        Status, named in `march_rows`.
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    row : int
+        Number of the whole step.
+    end : float
+        End of the step, as a fraction of the whole step.
     """
-    structure = system.structure
-    ports = system.ports
-    size = system.state.shape[1]
-    ticks = 1 << (structure.responses.shape[0] - 1)
-    dt = system.options.step
-    level = 0
-    if steps == 0:
-        press_at_rest(system)
+    moves = system.ports.values
+    duration = system.options.step / (1 << level)
+    find_damping(system, level)
 
-    for i in range(steps + 1):
-        write_sample(system, i, samples[i])
-        for k in range(size):
-            samples[i, k] = system.state[0, k]
-        output = sum_products(system.state[0], structure.modes[2])
-        if not abs(output) <= system.options.travel:
-            return i, EXCEEDS_TRAVEL if output == output else NOT_FINITE
-        if system.flank.size and system.flank[Flank.HAS_LIFTED] > 0:
-            return i, LEAVES_GROOVES
-        if i == steps:
-            break
+    # Velocity of order 2 from two increments (BDF2), of order 1 in the first step
+    last = system.points.clock[0]
+    ratio = duration / last if last > 0 else 0.0
+    part = find_order(system) * ratio / (1 + ratio)
+    step = Step(duration, (1 + part) / duration, part * ratio / duration)
 
-        # Mean forces of the ports in the whole step; `add_work` sums them over its parts.
-        first_column = size + Sample.PORTS + 2
-        for p in range(ports.values.shape[1]):
-            samples[i, first_column + N_PORT_COLUMNS * p] = 0.0
+    # Forces are extrapolated from the last steps by parabolas.
+    for p in range(moves.shape[1]):
+        force = 3 * (moves[Port.LAST, p] - moves[Port.EARLIER, p]) + moves[Port.FIRST, p]
+        moves[Port.FORCE, p] = force
+    if system.options.has_loads and system.structure.loads.size:
+        find_loads(system, row, end, False)
+    return solve_forces(system, level, step)
 
-        # A step that fails is halved; steps double again once they end on a tick of the longer one.
-        work = 0.0
-        tick = 0
-        while tick < ticks:
-            part = ticks >> level
-            tau = dt * tick / ticks
-            coefficients = structure.drive[i]
-            drive = (
-                coefficients[0] + tau * (coefficients[1] + 0.5 * tau * coefficients[2]),
-                coefficients[1] + tau * coefficients[2],
-                coefficients[2],
+
+@njit(**NJIT_CALL)
+def sum_forces(system, p):
+    """Return the friction force [N] of the points of port p at the end of the last step."""
+    points = system.points
+    total = 0.0
+    for block in range(points.first[p], points.first[p + 1]):
+        for j in range(points.count[block]):
+            total += points.values[block, Value.START + j]
+    return total
+
+
+@njit(**NJIT_CALL)
+def press_at_rest(system):
+    """Give the points the loads of the present state while they rest; write their forces and energies."""
+    points = system.points
+    if system.ports.contact[0] >= 0:
+        find_loads(system, 0, 0.0, False)
+    step = Step(0.0, 0.0, 0.0)
+    for block in range(points.law.size):
+        values = points.values[block]
+        for j in range(points.count[block]):
+            values[Value.SLIDE + j] = 0.0
+        if points.law[block] != Law.COULOMB:
+            slide_points(
+                points.law[block],
+                points.numbers[block],
+                points.memory[block],
+                points.trial[block],
+                values,
+                points.count[block],
+                step,
             )
-            if not try_step(system, level, i, tick / ticks, (tick + part) / ticks, drive):
-                level += 1
-                continue
-            if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
-                return i, NO_CONTACT_SET
-            work += add_work(system, samples[i], first_column, part / ticks)
-            tick += part
-            if level > 0 and tick % (2 * part) == 0:
-                level -= 1
-        samples[i, size + Sample.WORK] = work
-    return steps, DONE
+            for k in range(points.n_memory[block]):
+                points.memory[block, k] = points.trial[block, k]
+
+        for j in range(points.count[block]):
+            values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
+            values[Value.START + j] = values[Value.END + j]
+
+
+@njit(**NJIT_CALL)
+def find_path(points):
+    """Return the displacement [m] of the first point since the start, along its flank."""
+    return points.values[0, Value.TOTAL]
+
+
+@njit(**NJIT_CALL)
+def read_points(system, forces, stretch, loads):
+    """Write friction force [N], elastic stretch [m] and load [N] of the points of the first port, all (m,).
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march.
+    forces, stretch, loads : (m,) array
+        Output.
+    """
+    for i in range(forces.size):
+        values = system.points.values[i // WIDTH]
+        j = i % WIDTH
+        forces[i] = values[Value.START + j]
+        stretch[i] = values[Value.STRETCH + j]
+        loads[i] = values[Value.END_LOAD + j]
+
+
+@njit(**NJIT_CALL)
+def write_ports(system, sample):
+    """Write force and slip of each port to a sample, and add the energies of the points.
+
+    The slip is a mean over the points, weighted by their friction limits (load times the first number of the law).
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march.
+    sample : (k,) array
+        Sample, in the rows of `march_rows.Sample`; output.
+    """
+    ports = system.ports
+    points = system.points
+    size = system.state.shape[1]
+    for p in range(ports.values.shape[1]):
+        force = 0.0
+        slip = 0.0
+        weights = 0.0
+        stored = 0.0
+        for block in range(points.first[p], points.first[p + 1]):
+            values = points.values[block]
+            numbers = points.numbers[block]
+            is_rigid = points.law[block] == Law.COULOMB
+            n_lanes = (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
+            for j in range(n_lanes):
+                weight = values[Value.END_LOAD + j] * numbers[j]
+                elastic = 0.0 if is_rigid else values[Value.STRETCH + j]
+                force += values[Value.START + j]
+                slip += weight * (values[Value.TOTAL + j] - elastic)
+                weights += weight
+                stored += values[Value.ENERGY + j]
+
+        # A rigid point at rest has no force of its own: it carries the force that holds its port.
+        if ports.values[Port.HELD, p] > 0:
+            force = min(max(ports.values[Port.HOLD, p], -weights), weights)
+        column = size + Sample.PORTS + N_PORT_COLUMNS * p
+        sample[column] = force
+        # A port whose points are all without load does not stick at all.
+        sample[column + 1] = slip / weights if weights > 0 else ports.values[Port.SLIDE, p]
+        row = Sample.ENERGY
+        if points.is_spring[p]:
+            row = Sample.SPRINGS
+            sample[column + 1] = 0.0
+        sample[size + row] += stored

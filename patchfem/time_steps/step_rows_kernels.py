@@ -140,46 +140,6 @@ class BondRow(IntEnum):
     VISCOUS = 11 * WIDTH
 
 
-class Port(IntEnum):
-    """Rows of `Ports.values`.
-
-    - SLIDE, VELOCITY: at the start of a step [m], [m/s]
-    - FREE, FREE_VELOCITY: increment and velocity at the end without forces [m], [m/s]
-    - FORCE: mean force of the step [N]
-    - END_VELOCITY, INCREMENT: velocity at the end [m/s] and increment [m] under the assumed forces
-    - HOLD: force that holds a port at rest [N]
-    - SUM, BY_SLIDE, BY_VELOCITY: sums over the points of the port of their forces and of the slopes
-    - BASE: force from which a line search starts [N]
-    - LAST, EARLIER, FIRST: mean forces of the last three steps [N], the last one first
-    - DAMPING: weight of the force at the end of the step in the mean force, above 0 where the step does not resolve the
-      vibration of the port on its points
-    - STIFFNESS, VISCOSITY: of the points at rest [N/m], [N s/m]
-    - MOVE: increment of the points [m]
-    - RETURN: displacement of a rigid port at rest that is taken back [m]
-    """
-
-    SLIDE = 0
-    VELOCITY = 1
-    FREE = 2
-    FREE_VELOCITY = 3
-    FORCE = 4
-    END_VELOCITY = 5
-    HOLD = 6
-    INCREMENT = 7
-    SUM = 8
-    BY_SLIDE = 9
-    BY_VELOCITY = 10
-    BASE = 11
-    LAST = 12
-    EARLIER = 13
-    DAMPING = 14
-    STIFFNESS = 15
-    VISCOSITY = 16
-    MOVE = 17
-    RETURN = 18
-    FIRST = 19
-
-
 class Points(NamedTuple):
     """Points of p ports in b blocks; r shear coordinates of the pieces.
 

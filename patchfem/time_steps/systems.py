@@ -2,21 +2,14 @@
 
 import numpy as np
 
-from .. import compiled
 from ..core import ModalBasis
 from ..friction.bonds.list_numbers import make_no_lists
 from ..points import time_march
-from ..points.march_rows import RESULTANT, Flank, Options, Ports, Shear, Structure, System, Total
-from .step_rows_kernels import N_VALUES, WIDTH, Law, Points, Port, Value
+from ..points.march_rows import RESULTANT, Options, Port, Ports, Shear, Structure, System, Total
+from .step_rows_kernels import N_VALUES, WIDTH, Law, Points, Value
 
 # Lengths of the steps: whole ones, and those after up to seven halvings, by which a step that fails is retried
 N_LEVELS = 8
-
-
-def load_kernels(contact, say=None):
-    """Return the compiled march, with contact sets only if a contact needs them."""
-    parts = {} if contact.sets is not None else {"normal": "points.no_normal_kernels"}
-    return compiled.instantiate("time_steps.march_kernels", parts, say)
 
 
 def make_system(
@@ -272,40 +265,3 @@ def _count_memory(sets, blocks) -> np.ndarray:
         else:
             used.append(2 * sliders.weights.size * part.count)
     return np.concatenate(used)
-
-
-def make_snapshot(kernels, system: System, motion: tuple[float, ...]) -> time_march.Snapshot:
-    """Return the state of the points on the first port; `motion` has the first six fields of Snapshot.
-
-    Parameters
-    ----------
-    kernels : module
-        Compiled march.
-    system : march_rows.System
-        Arrays of the march.
-    motion : tuple
-        The first six fields of Snapshot.
-    """
-    points = system.points
-    n_blocks = int(points.first[1])
-    count = int(points.count[:n_blocks].sum())
-    values = points.values.reshape(-1, N_VALUES, WIDTH)
-
-    def read(row):
-        """Return a row of the points of the first port (m,)."""
-        return values[:n_blocks, row // WIDTH].reshape(-1)[:count].copy()
-
-    forces = read(Value.START)
-    own = slice(0, points.first_shear[1])
-    shapes = points.shapes[own, :count]
-    bend = (shapes @ forces / points.stiffness[own]) @ shapes
-    has_nodes = system.ports.contact[0] >= 0
-    return time_march.Snapshot(
-        *motion,
-        forces,
-        read(Value.STRETCH),
-        bend,
-        read(Value.END_LOAD),
-        points.nodal.copy() if has_nodes else np.zeros(0),
-        float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0,
-    )
