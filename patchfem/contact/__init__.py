@@ -6,10 +6,10 @@ forces f or pressures, the gap under load, the approach delta and the rotation t
     w = g + theta x - delta + C f >= 0,    f >= 0,    f . w = 0.
 
 `gaps` has the shapes of the surfaces. `press_cases` presses many cases of a pair of pieces on a table of contact sets
-(`set_table`), from which `edges` derives where the contacts end. `press.press_strips` presses one or more strips side by
-side, bare or with asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves a patch as a single case, strips by
-the methods of `active_set` and, if these fail, of `bounded`, and checks the solution; `strip_compliance` holds C. Read
-`gaps`, `set_table`, `press_cases` and `press` first.
+(`set_table`), from which `edges` derives where the contacts end. `press.press_patch` presses one patch, bare or with
+asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves it as a single case of a table or, if this fails, by
+the methods of `bounded` and `active_set`, and checks the solution. Read `gaps`, `set_table`, `press_cases` and `press`
+first.
 
 `contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `press_path_kernels`).
 
@@ -50,10 +50,7 @@ PUBLIC = {
     "gaps": ("SHAPE_PROPERTIES",),
     "press": (
         "Holder",
-        "StripLayout",
-        "StripModel",
-        "press_strips",
-        "split_into_strips",
+        "press_patch",
     ),
     "press_cases": (
         "HolderCases",
@@ -85,6 +82,5 @@ PUBLIC = {
         "solve_set",
     ),
     "stiffness": ("tangential_stiffness",),
-    "strip_compliance": ("StripCompliance",),
     "unilateral": ("INDEFINITE_COMPLIANCE_MESSAGE",),
 }

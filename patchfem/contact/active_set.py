@@ -1,17 +1,15 @@
-"""Active-set methods for the unilateral contact of nodes under one rigid holder.
+"""Primal active-set method for the unilateral contact of a patch under a rigid holder.
 
 Find nodal forces f >= 0 and a motion q of the holder such that
 
     w = g - R q + C f >= 0,    f . w = 0,    R^T f + S q = t,
 
 with the gap g, the closing R of the nodes per unit of each free motion, the compliance C, the springs S of the holder
-and the prescribed load and moments t. These are the optimality conditions of a strictly convex quadratic program with
+and the prescribed load and moment t. These are the optimality conditions of a strictly convex quadratic program with
 the energy f . C f/2 + g . f (+ that of the springs).
 
-Both methods solve the equations w = 0 on a set A of active nodes and f = 0 elsewhere, signs aside (`solve_on_set`).
-`solve_primal_dual` exchanges all nodes of a wrong sign at once; it takes few steps, but may return to a set.
-`solve_primal` exchanges one node at a time; the energy decreases, so the method ends. A patch and several
-strips differ in their compliance only (`strip_compliance`).
+`solve_on_set` solves the equations w = 0 on a set A of active nodes and f = 0 elsewhere, signs aside. `solve_primal`
+exchanges one node of the set at a time; the energy decreases, so the method ends.
 """
 
 from typing import NamedTuple
@@ -19,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import NotConverged
+from ..elasticity.lapack import dpotrf, dpotrs
 
 # Rounding error of an opening, relative to the sum of the magnitudes of its terms
 OPENING_ROUND_OFF = 1e-14
@@ -26,14 +25,13 @@ N_REFINEMENT_STEPS = 2  # number of steps of iterative refinement; a third step 
 
 
 class ContactProblem(NamedTuple):
-    """Contact of n nodes of a body that is pressed by a rigid holder with r unconstrained motions.
+    """Contact of the n nodes of a patch that is pressed by a rigid holder with r free motions.
 
     - gap (n,): Gap [m] between the undeformed surfaces; negative where they overlap under a given approach.
-    - motions (n, r): Closing of each node per unit of each free motion. The first one is the approach [m],
-      a column of ones; the others are rotations. No column: the approach is prescribed and already
-      contained in the gap.
-    - target (r,): Load [N], then the moments about the axes of the free rotations [N m].
-    - springs (r,): Stiffness [N m/rad] of the holder against each motion, 0 for the approach.
+    - motions (n, r): Closing of each node per unit of each free motion: ones for the approach [m], then the positions
+      [m] for the rotation. No column: the approach is prescribed and already contained in the gap.
+    - target (r,): Load [N], then the moment about x = 0 [N m] of a free rotation.
+    - springs (r,): Stiffness of the holder against each motion: 0 for the approach, [N m/rad] for the rotation.
     """
 
     gap: np.ndarray
@@ -42,22 +40,22 @@ class ContactProblem(NamedTuple):
     springs: np.ndarray
 
     @property
-    def free_rotations(self) -> list[int]:
-        """Indices of the rotations that no spring restrains."""
-        return [k for k in range(1, self.springs.size) if self.springs[k] == 0]
+    def has_free_rotation(self) -> bool:
+        """Whether the holder rotates and no spring restrains it."""
+        return self.springs.size == 2 and self.springs[1] == 0
 
     @property
     def min_nodes(self) -> int:
         """Smallest number of nodes in contact that determines the motion of the holder."""
-        return 1 + len(self.free_rotations)
+        return 2 if self.has_free_rotation else 1
 
 
-def make_patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
-    """Return the contact problem of a patch that consists of a single strip.
+def make_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
+    """Return the contact problem of a patch, with an unknown motion for each prescribed load.
 
     Parameters
     ----------
-    x, gap : (m,) ndarray
+    x, gap : (n,) ndarray
         Positions [m] along the interface and gap [m].
     load : float, optional
         Load [N]; without it the approach is prescribed and contained in the gap.
@@ -65,6 +63,10 @@ def make_patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> C
         Moment of the load about x = 0 [N m], the rotation being free; without it the rotation is prescribed.
     spring : float
         Stiffness [N m/rad] of the holder against the rotation.
+
+    Returns
+    -------
+    ContactProblem
     """
     loads = [value for value in (load, moment) if value is not None]
     motions = np.ones((len(loads), x.size))
@@ -73,13 +75,24 @@ def make_patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> C
     return ContactProblem(gap, motions.T, np.array(loads, float), springs)
 
 
+def factorise(matrix: np.ndarray) -> np.ndarray:
+    """Return the lower Cholesky factor (n, n) of a symmetric matrix (n, n), which is overwritten.
+
+    Raises LinAlgError if the matrix is not positive definite.
+    """
+    lower_factor, info = dpotrf(matrix.T, lower=1, overwrite_a=1, clean=0)
+    if info:
+        raise np.linalg.LinAlgError("not positive definite")
+    return lower_factor
+
+
 class SetSolution(NamedTuple):
     """Solution of the contact equations for a given active set; the forces may have either sign.
 
     - force, opening (n,): Forces [N] and gap under load [m].
     - scale (n,): Sum of the magnitudes of the terms of each opening [m], to which its rounding error is
       compared.
-    - motion (r,): Approach [m] and rotations [rad] q.
+    - motion (r,): Approach [m] and rotation [rad] q.
     """
 
     force: np.ndarray
@@ -98,8 +111,8 @@ def solve_on_set(
 
     Parameters
     ----------
-    compliance : StripCompliance
-        C, positive definite on the active nodes.
+    compliance : (n, n) ndarray
+        C [m/N], positive definite on the active nodes.
     problem : ContactProblem
         Gap [m], motions and loads of the n nodes.
     active : (n,) bool ndarray
@@ -132,11 +145,11 @@ def solve_on_set(
     rows[:, nodes] = problem.motions.T[:, index]
     rows[:, index.size :] = np.eye(n_motions)
     rows[1:] -= (rows[1:, :1] + rows[1:, index.size - 1 : index.size]) / 2 * rows[:1]
-    solve_block = compliance.solver(active)
+    factor = factorise(compliance[index[:, None], index])
 
     # The solution holds the forces that these motions cause in the nodes, then in the springs.
     solution = right_sides.copy()
-    solution[:, nodes] = solve_block(right_sides[:, nodes].T).T
+    solution[:, nodes] = dpotrs(factor, right_sides[:, nodes].T, lower=1)[0].T
     solution[:, index.size :] *= problem.springs
 
     # Modified Gram-Schmidt: the motions are made orthogonal, in the scalar product of C^-1. Forces of one motion then do
@@ -170,12 +183,12 @@ def solve_on_set(
     force = np.zeros(problem.gap.size)
     for step in range(n_refinements + 1):
         force[index] = nodal_force
-        displacement = compliance.product(force)
+        displacement = compliance @ force
         opening = problem.gap - motion @ motions + displacement
         if step < n_refinements:
             spring_load = transform.T @ (motion @ forces[:, index.size :])
             force_change, motion_change = close_gap(
-                gap_force=solve_block(opening[index, None])[:, 0],
+                gap_force=dpotrs(factor, opening[index], lower=1)[0],
                 loads=target - rows[:, nodes] @ nodal_force - spring_load,
             )
             nodal_force = nodal_force + force_change
@@ -189,19 +202,25 @@ def solve_on_set(
     )
 
 
-def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSolution:
-    """Improve a solution by iterative refinement on its active set if this reduces its violation.
+def _refine_solution(
+    compliance, problem: ContactProblem, solution: SetSolution, active
+) -> SetSolution:
+    """Return the solution on a set, improved by iterative refinement where rounding errors show in its openings.
 
     Parameters
     ----------
-    compliance : StripCompliance
-        Compliance with which it was found.
+    compliance : (n, n) ndarray
+        C [m/N].
     problem : ContactProblem
-        Problem that it solves.
+        Gap [m], motions and loads of the n nodes.
     solution : SetSolution
-        Solution on the set `active`; it is returned unless its openings show rounding errors.
+        Solution on the set; it is kept if the refinement does not reduce its violation.
     active : (n,) bool ndarray
         Nodes in contact.
+
+    Returns
+    -------
+    SetSolution
     """
     # The solution is refined only if an opening exceeds a tenth of the overlap at which a node
     # enters the set.
@@ -223,74 +242,30 @@ def compute_relative_violation(solution: SetSolution) -> float:
     return float(max(in_contact, -opening.min(), tension))
 
 
-def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
-    """Add nodes to an active set until it can carry the load.
+def _complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
+    """Return a contact set (n,) of bool with the nodes added without which it cannot carry the load.
 
     An empty set gets the nodes of the smallest gap. Where a set does not reach to both sides of the load line of a free
     rotation, the node of the smallest gap on each side is added.
 
-    `problem` gives the gap and the load lines. The array `active` (n,) of bool itself is not changed.
-    """
-    if not problem.free_rotations:
-        return problem.gap <= problem.gap.min()
-    for k in problem.free_rotations:
-        position = problem.motions[:, k]
-        load_line = problem.target[k] / problem.target[0]
-        active_positions = position[active]
-        if (
-            active_positions.size > 1
-            and active_positions.min() <= load_line <= active_positions.max()
-        ):
-            continue
-        active = active.copy()
-        for is_side in (position <= load_line, position > load_line):
-            active[np.argmin(np.where(is_side, problem.gap, np.inf))] = True
-    return active
-
-
-def solve_primal_dual(
-    compliance, problem: ContactProblem, active: np.ndarray, max_iterations: int = 100
-) -> tuple[SetSolution | None, int]:
-    """Solve by the primal-dual active-set method (Hintermüller, Ito, Kunisch 2003).
-
-    Nodes of tensile force leave the set and nodes that overlap enter it, all at once, until the set repeats itself. The
-    method usually takes 3 to 20 steps, but it may cycle.
-
     Parameters
     ----------
-    compliance : StripCompliance
-        C, positive definite.
     problem : ContactProblem
-        Gap [m], motions and loads of the n nodes.
+        Gap, motions and loads of the n nodes.
     active : (n,) bool ndarray
-        Set to start from.
-    max_iterations : int
-        Number of sets after which the method gives up.
-
-    Returns
-    -------
-    solution : SetSolution or None
-        None if a set came back, a set was singular, or the number of iterations was exceeded.
-    n_iterations : int
+        Contact set, which is not changed.
     """
-    visited = set()
-    for iteration in range(1, max_iterations + 1):
-        if problem.free_rotations or not active.any():
-            active = complete_set(problem, active)
-        key = active.tobytes()
-        if key in visited:
-            return None, iteration
-        visited.add(key)
-        try:
-            solution = solve_on_set(compliance, problem, active)
-        except np.linalg.LinAlgError:
-            return None, iteration
-        overlaps = solution.opening < -OPENING_ROUND_OFF * solution.scale
-        next_active = np.where(active, solution.force > 0, overlaps)
-        if next_active.tobytes() == key:
-            return refine_solution(compliance, problem, solution, active), iteration
-        active = next_active
-    return None, max_iterations
+    if not problem.has_free_rotation:
+        return active if active.any() else problem.gap <= problem.gap.min()
+    position = problem.motions[:, 1]
+    load_line = problem.target[1] / problem.target[0]
+    own = position[active]
+    if own.size > 1 and own.min() <= load_line <= own.max():
+        return active
+    completed = active.copy()
+    for is_side in (position <= load_line, position > load_line):
+        completed[np.argmin(np.where(is_side, problem.gap, np.inf))] = True
+    return completed
 
 
 def solve_primal(
@@ -312,12 +287,12 @@ def solve_primal(
 
     Parameters
     ----------
-    compliance : StripCompliance
-        C, positive definite.
+    compliance : (n, n) ndarray
+        C [m/N], positive definite.
     problem : ContactProblem
         Gap [m], motions and loads of the n nodes.
     force : (n,) ndarray
-        Forces [N] >= 0 whose resultants are the prescribed load and moments.
+        Forces [N] >= 0 whose resultants are the prescribed load and moment.
     max_iterations : int, optional
         Number of steps after which the method gives up, 20 n by default.
 
@@ -335,8 +310,7 @@ def solve_primal(
     active = force > 0
     max_iterations = max_iterations or 20 * force.size
     for iteration in range(1, max_iterations + 1):
-        if problem.free_rotations or not active.any():
-            active = complete_set(problem, active)
+        active = _complete_set(problem, active)
         solution = solve_on_set(compliance, problem, active)
 
         # Ratio test: the step towards the minimum ends where the first force becomes zero
@@ -355,7 +329,7 @@ def solve_primal(
         overlap = np.where(active, np.inf, solution.opening / solution.scale)
         entering = int(np.argmin(overlap))
         if overlap[entering] >= -OPENING_ROUND_OFF:
-            return refine_solution(compliance, problem, solution, active), iteration
+            return _refine_solution(compliance, problem, solution, active), iteration
         active[entering] = True
     raise NotConverged(
         "contact: the active-set iteration did not converge; refine contact.element_size or change the "
@@ -411,43 +385,16 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
 
 
 def find_rest_motion(problem: ContactProblem) -> np.ndarray:
-    """Return the motion q (r,) of a contact problem at which a rigid piece is in equilibrium.
+    """Return approach [m] and rotation [rad] q (r,) at which a rigid piece rests on the other one.
 
-    The rotations are found about one axis after the other.
-
-    The motion is the approach [m], then the rotations [rad] that the problem leaves free.
+    `problem` has the gap of the nodes and the loads; without a load r is 0.
     """
     motion = np.zeros(problem.target.size)
     gap = problem.gap
-    for k in range(1, motion.size):
-        position = problem.motions[:, k]
-        lowest = gap
-        # Several strips have nodes at the same position.
-        if (position[1:] <= position[:-1]).any():
-            position, group = np.unique(position, return_inverse=True)
-            lowest = np.full(position.size, np.inf)
-            np.minimum.at(lowest, group, gap)
-        load = problem.target[0]
-        motion[k] = -find_rest_rotation(
-            position, lowest, load, moment=problem.target[k], spring=problem.springs[k]
-        )
-        gap = gap - motion[k] * problem.motions[:, k]
+    if motion.size > 1:
+        load, moment = problem.target
+        position = problem.motions[:, 1]
+        motion[1] = -find_rest_rotation(position, gap, load, moment, problem.springs[1])
+        gap = gap - motion[1] * position
     motion[:1] = gap.min()
     return motion
-
-
-def guess_contact_set(compliance, problem: ContactProblem) -> np.ndarray:
-    """Guess the nodes in contact (n,) of a problem from the gap between rigid pieces in equilibrium.
-
-    The closing is estimated as the geometric mean of the deflections under a point load and under a uniform load.
-    Under a prescribed approach these are the nodes that overlap.
-
-    `compliance` [m/N] is that of the n nodes: a `StripCompliance`, or an object with its `product` and
-    `node_compliance`.
-    """
-    gap = problem.gap
-    if not problem.target.size:
-        return gap < 0
-    uniform = compliance.product(np.full(gap.size, 1 / gap.size)).mean()
-    depth = problem.target[0] * np.sqrt(abs(compliance.node_compliance * uniform))
-    return gap <= gap.min() + depth

@@ -20,6 +20,7 @@ class LinearAsperities:
     -s > 0 is the compression of the layer; at s >= 0 it carries nothing.
     """
 
+    is_smooth: ClassVar[bool] = False
     k: float
 
     def pressure(self, s: np.ndarray) -> np.ndarray:
@@ -59,7 +60,7 @@ class SmoothAsperities:
 class ExponentialAsperities(SmoothAsperities):
     """Exponential law of the asperity layer: P = reference exp(-s/u0) at the separation s [m] of the mean planes.
 
-    u0 [m] > 0 is the decay length, reference [Pa] the pressure at s = 0. Without a reference `press.press_strips`
+    u0 [m] > 0 is the decay length, reference [Pa] the pressure at s = 0. Without a reference `press.press_patch`
     takes the mean pressure of the given load. Flat aligned pieces then have s = 0, and the approach is the closing of
     the bodies alone. The choice shifts the approach and nothing else.
     """

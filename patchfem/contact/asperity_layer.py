@@ -1,4 +1,4 @@
-"""Solver of strips with an asperity layer of a smooth law under one rigid holder.
+"""Contact of a patch through an asperity layer of a smooth law under a rigid holder.
 
 With the pressure law P of this layer, the nodal areas A and the notation of `active_set` the equations are
 
@@ -17,7 +17,6 @@ from scipy.linalg import cho_factor, cho_solve
 from ..core import NotConverged, PatchfemError
 from .active_set import ContactProblem
 from .asperity_laws import SmoothAsperities
-from .strip_compliance import StripCompliance
 from .unilateral import compute_balances, solve
 
 # Largest number of Newton steps; thin layers on rough gaps need up to 40
@@ -41,16 +40,16 @@ MIN_GAP_DEPTH = 1e-150
 
 
 class AsperityProblem(NamedTuple):
-    """Contact of strips through a compliant asperity layer whose pressure law is smooth.
+    """Contact of a patch through a compliant asperity layer whose pressure law is smooth.
 
     - asperities: Pressure law of the layer.
-    - compliance: Compliance of the pieces.
+    - compliance (n, n): Compliance [m/N] of the pieces; that of rigid pieces is 0.
     - area (n,): Nodal areas [m2].
-    - contact: Gap, motions and loads; the motions are scaled so that none closes a node by more than 1.
+    - contact: Gap, motions and loads.
     """
 
     asperities: SmoothAsperities
-    compliance: StripCompliance
+    compliance: np.ndarray
     area: np.ndarray
     contact: ContactProblem
 
@@ -61,10 +60,10 @@ class AsperityProblem(NamedTuple):
 
     def separation(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Return the separations (n,) [m] of the mean planes for given forces [N] and a given motion."""
-        return self.contact.gap - self.contact.motions @ motion + self.compliance.product(force)
+        return self.contact.gap - self.contact.motions @ motion + self.compliance @ force
 
     def imbalance(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
-        """Return load [N] and moments [N m] (r,) that forces (n,) [N] and springs do not balance at a given motion (r,)."""
+        """Return load [N] and moment [N m] (r,) that forces (n,) [N] and spring do not balance at a given motion (r,)."""
         contact = self.contact
         return contact.target - contact.motions.T @ force - contact.springs * motion
 
@@ -74,7 +73,7 @@ class AsperitySolution(NamedTuple):
 
     - force (n,): Nodal forces [N].
     - separation (n,): Separations [m] of the mean planes.
-    - motion (r,): Approach [m] and rotations [rad] of the holder.
+    - motion (r,): Approach [m] and rotation [rad] of the holder.
     - n_iterations: Number of Newton steps.
     """
 
@@ -104,28 +103,23 @@ def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _Newto
     mismatch : (n,) array
         Separation of the geometry less that of the law [m].
     imbalance : (r,) array
-        Missing load and moments.
+        Missing load [N] and moment [N m].
     """
     contact = problem.contact
-    n_nodes = len(problem.compliance.common)
-    negligible = MIN_RELATIVE_SLOPE * slope.max()
     columns = np.column_stack([contact.motions, mismatch])
     forces = np.zeros(columns.shape)
 
-    # Forces D^1/2 (I + D^1/2 C D^1/2)^-1 D^1/2 of the nodes that the layer loads, for each column; the matrix of a strip is
-    # well conditioned at every slope D
-    for strip, strip_slope in enumerate(slope.reshape(-1, n_nodes)):
-        in_strip = np.flatnonzero(strip_slope > negligible)
-        if not in_strip.size:
-            continue
-        nodes = strip * n_nodes + in_strip
+    # Forces D^1/2 (I + D^1/2 C D^1/2)^-1 D^1/2 of the nodes that the layer loads, for each column; this matrix is well
+    # conditioned at every slope D
+    nodes = np.flatnonzero(slope > MIN_RELATIVE_SLOPE * slope.max())
+    if nodes.size:
         root = np.sqrt(slope[nodes])[:, None]
-        matrix = root * problem.compliance.block(strip, in_strip) * root.T
+        matrix = root * problem.compliance[nodes[:, None], nodes] * root.T
         matrix[np.diag_indices_from(matrix)] += 1.0
         factor = cho_factor(matrix, lower=True, overwrite_a=True)
         forces[nodes] = root * cho_solve(factor, root * columns[nodes])
 
-    # The motion balances load and moments
+    # The motion balances load and moment
     by_motions = forces[:, :-1]
     by_mismatch = forces[:, -1]
     motion = imbalance + contact.motions.T @ by_mismatch
@@ -133,7 +127,7 @@ def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _Newto
         tangent = contact.motions.T @ by_motions + np.diag(contact.springs)
         motion = np.linalg.lstsq(tangent, motion, rcond=1e-14)[0]
     force = by_motions @ motion - by_mismatch
-    displacement = problem.compliance.product(force)
+    displacement = problem.compliance @ force
     return _NewtonStep(force, motion, mismatch - contact.motions @ motion + displacement)
 
 
@@ -172,7 +166,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         fraction = np.exp(np.minimum(0.0, new_log_force - log_force.max()))
 
         # The iteration has converged if the changes are below the tolerance or below rounding errors
-        depth = np.ptp(contact.gap) + np.abs(problem.compliance.product(force)).max()
+        depth = np.ptp(contact.gap) + np.abs(problem.compliance @ force).max()
         depth += 2 * np.abs(motion[1:]).sum()
         # Round-off of a separation changes the pressure of the loaded nodes by this fraction.
         noise = LAYER_NEWTON_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
@@ -199,7 +193,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
 
 
 def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
-    """Solve strips under a prescribed approach, which the gap of the problem already contains.
+    """Solve a patch under a prescribed approach, which the gap of the problem already contains.
 
     No node carries force if nothing touches. The law of the layer gives ln p [p in Pa] and its decay rate [1/m] by
     `log_pressure`, and the separation [m] at a pressure by `separation`.
@@ -212,10 +206,10 @@ def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
 
     # No node can carry more force than the one that flattens its overlap
     separation = gap
-    diagonal = problem.compliance.common.diagonal()
+    diagonal = problem.compliance.diagonal()
     if (diagonal > 0).all():
         overlap = np.maximum(-gap, np.abs(gap).max() * 1e-3)
-        max_pressure = overlap / (np.resize(diagonal, gap.size) * problem.area)
+        max_pressure = overlap / (diagonal * problem.area)
         separation = np.maximum(gap, asperities.separation(max_pressure))
     if asperities.log_pressure(separation)[0].max() > -MAX_UNTOUCHED_LOG_PRESSURE:
         raise PatchfemError(
@@ -237,8 +231,7 @@ def _linearised_start(problem: AsperityProblem) -> tuple[np.ndarray, np.ndarray]
     stiffness = mean_pressure * problem.asperities.log_pressure(mean_separation)[1][0]
     # The tangent of the pressure law is zero at this separation.
     first_touch = mean_separation[0] + mean_pressure / stiffness
-    n_nodes = len(problem.compliance.common)
-    compliance = problem.compliance.add_to_diagonal(1 / (stiffness * problem.area[:n_nodes]))
+    compliance = problem.compliance + np.diag(1 / (stiffness * problem.area))
     try:
         linear = solve(compliance, contact._replace(gap=contact.gap - first_touch))
     except (np.linalg.LinAlgError, NotConverged):
@@ -253,32 +246,28 @@ def _linearised_start(problem: AsperityProblem) -> tuple[np.ndarray, np.ndarray]
     return np.where(pressure > mean_pressure, on_law, on_tangent), linear.motion
 
 
-def compute_law_residuals(
-    asperities: SmoothAsperities, area, problem: ContactProblem, solution: AsperitySolution
-) -> dict[str, float]:
-    """Compute the relative residuals of the contact conditions for strips with a smooth asperity layer.
+def compute_law_residuals(layer: AsperityProblem, solution: AsperitySolution) -> dict[str, float]:
+    """Compute the relative residuals of the contact conditions for a patch with a smooth asperity layer.
 
     The mismatch of the law is relative to the largest force and to 1e-5 of what the law gains over the depth of the gap;
-    pressures that count as none are left out.
+    pressures that count as none are left out. The check takes the separations of the geometry, a solution those of the
+    law.
 
     Parameters
     ----------
-    asperities : SmoothAsperities
-        Pressure law of the layer.
-    area : (n,) ndarray
-        Nodal areas [m2].
-    problem : ContactProblem
-        Gap [m], motions and loads of the n nodes.
+    layer : AsperityProblem
+        Problem as it was given.
     solution : AsperitySolution
-        Its separations are those of the geometry.
+        Forces and motion that are checked.
 
     Returns
     -------
     dict of float
         tension, law, and the balances of `unilateral.compute_balances`.
     """
+    asperities, _, area, problem = layer
     force = solution.force
-    opening = solution.separation
+    opening = layer.separation(force, solution.motion)
     depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + MIN_GAP_DEPTH
     largest = max(force.max(), np.exp(MAX_UNTOUCHED_LOG_PRESSURE))
     mismatch = np.abs(force - area * asperities.pressure(opening))
@@ -291,48 +280,36 @@ def compute_law_residuals(
     }
 
 
-def press_with_asperities(
-    strips, problem: ContactProblem
-) -> tuple[AsperitySolution, dict[str, float]]:
-    """Solve strips with an asperity layer of a smooth pressure law.
+def press_with_asperities(layer: AsperityProblem) -> AsperitySolution:
+    """Solve the contact of a patch through an asperity layer of a smooth pressure law.
 
     Parameters
     ----------
-    strips : press.StripModel
-        Compliance, nodes and pressure law.
-    problem : ContactProblem
-        Gap [m], motions and loads of the nodes of all strips.
+    layer : AsperityProblem
+        Law, pieces, gap and loads.
 
     Returns
     -------
-    solution : AsperitySolution
-    residuals : dict of float
-        Relative residuals by name.
+    AsperitySolution
 
     Raises
     ------
     NotConverged
         If Newton's method fails.
+    PatchfemError
+        If the pressure under a prescribed approach is too large to compute.
     """
-    compliance, layout, asperities = strips
-    area = np.tile(layout.weight, layout.offsets.size)
-
+    problem = layer.contact
     if not problem.target.size:
-        solution = _solve_at_approach(AsperityProblem(asperities, compliance, area, problem))
-    else:
-        # The largest closing of a node per unit of motion becomes 1, and load and moments become comparable.
-        scale = 1 / np.abs(problem.motions).max(axis=0)
-        scaled = problem._replace(
-            motions=problem.motions * scale,
-            target=problem.target * scale,
-            springs=problem.springs * scale**2,
-        )
-        layer = AsperityProblem(asperities, compliance, area, scaled)
-        solution = _solve_newton(layer, *_linearised_start(layer))
-        solution = solution._replace(motion=solution.motion * scale)
+        return _solve_at_approach(layer)
 
-    # The check takes the separations of the geometry, the solution has those of the law.
-    opening = problem.gap - problem.motions @ solution.motion + compliance.product(solution.force)
-    geometric = solution._replace(separation=opening)
-    residuals = compute_law_residuals(asperities, area, problem, geometric)
-    return solution, residuals
+    # The largest closing of a node per unit of motion becomes 1, so that load and moment become comparable
+    scale = 1 / np.abs(problem.motions).max(axis=0)
+    scaled = problem._replace(
+        motions=problem.motions * scale,
+        target=problem.target * scale,
+        springs=problem.springs * scale**2,
+    )
+    scaled_layer = layer._replace(contact=scaled)
+    solution = _solve_newton(scaled_layer, *_linearised_start(scaled_layer))
+    return solution._replace(motion=solution.motion * scale)

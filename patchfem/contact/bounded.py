@@ -16,11 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .active_set import ContactProblem
-from .strip_compliance import StripCompliance
-
-# Largest residual of nodal forces, from which the methods of active sets go on
-NODAL_RESIDUAL_TOL = 1e-11
 # Number of steps without a lower energy after which a projected gradient step follows. A changed set of cells takes two or
 # three steps to lower the energy.
 MAX_STEPS_WITHOUT_GAIN = 8
@@ -202,39 +197,6 @@ class _Directions:
         self.last_slope = slope
         self.last_square = square
         return direction
-
-
-def solve_nodal_forces(compliance: StripCompliance, problem: ContactProblem) -> BoundedSolution:
-    """Solve the contact problem of the nodes of strips; its tractions are nodal forces [N].
-
-    Parameters
-    ----------
-    compliance : StripCompliance
-        Compliance [m/N] of the n nodes.
-    problem : ContactProblem
-        Gap [m], motions, loads and springs.
-
-    Returns
-    -------
-    BoundedSolution
-        Forces (n,) [N] in place of tractions.
-    """
-    bounded = BoundedProblem(
-        problem.gap, 0.0, np.inf, problem.motions.T, problem.target, problem.springs
-    )
-    return solve_bounded(_NodalCompliance(compliance), bounded, tolerance=NODAL_RESIDUAL_TOL)
-
-
-class _NodalCompliance:
-    """Compliance of the nodes of strips as an operator of `solve_bounded`."""
-
-    def __init__(self, compliance: StripCompliance):
-        self.product = compliance.product
-        self.self_compliance = compliance.node_compliance
-
-    def precondition(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the forces (n,) [N] of nodes without coupling for displacements (n,) [m]."""
-        return displacement / self.self_compliance
 
 
 class _State(NamedTuple):

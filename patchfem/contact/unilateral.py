@@ -4,13 +4,11 @@ Find nodal forces f >= 0 with w = g + theta x - delta + C f >= 0 and f . w = 0. 
 prescribed, or the load sum f = N. Under a load the rotation theta is prescribed (it is part of g), free under a moment,
 sum f x = M, or held by the spring of the holder, sum f x = M + K theta.
 
-`solve` measures the gap from the rest position of a rigid piece and uses the primal-dual active-set method, for a patch
-on a table of contact sets (`press_cases`); where that cycles, conjugate gradients and the primal active-set method
-follow. `compute_residuals` checks every solution again and
-shares no intermediate result with the solver.
+`solve` measures the gap from the rest position of a rigid piece and finds the contact set on a table of contact sets
+(`press_cases`); where that cycles, conjugate gradients and the primal active-set method follow. `compute_residuals`
+checks every solution again and shares no intermediate result with the solver.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,17 +20,17 @@ from .active_set import (
     ContactProblem,
     SetSolution,
     compute_relative_violation,
+    factorise,
     find_rest_motion,
-    guess_contact_set,
     solve_primal,
-    solve_primal_dual,
 )
 from .press_cases import HolderCases, press_on_table
 from .set_table import SetTable
-from .strip_compliance import StripCompliance, factorise
 
 # Largest relative residual of a solved contact; that of a wrong set is 1e-9 or more
 CONTACT_RESIDUAL_TOL = 1e-12
+# Largest residual of the conjugate gradients, from which the primal active-set method goes on
+GRADIENT_RESIDUAL_TOL = 1e-11
 # Message about a compliance that is not positive definite
 INDEFINITE_COMPLIANCE_MESSAGE = (
     "contact: the compliance of the pieces is not positive definite to working precision; raise "
@@ -47,8 +45,8 @@ class ContactSolution(NamedTuple):
     """Solution of a contact problem: nodal forces and motion of the holder.
 
     - force (n,): Nodal forces [N], > 0 on the contact set and 0 elsewhere.
-    - motion (r,): Approach [m] and rotations [rad] q; the rotation about y is -theta.
-    - n_iterations: Number of contact sets tried.
+    - motion (r,): Approach [m] and rotation [rad] q; the rotation is -theta.
+    - n_iterations: Number of contact sets and of gradient steps tried.
     """
 
     force: np.ndarray
@@ -56,46 +54,45 @@ class ContactSolution(NamedTuple):
     n_iterations: int
 
 
-def _solve_by_fallbacks(
-    compliance, problem: ContactProblem, max_iterations: int
-) -> tuple[SetSolution, int]:
-    """Solve a contact problem by slower methods if the primal-dual method does not converge.
+class _NodalCompliance:
+    """Compliance (n, n) [m/N] of nodes as an operator of `bounded.solve_bounded`."""
 
-    The methods are, in turn: primal-dual from all nodes, primal-dual from the result of conjugate gradients, and primal,
-    which always ends. The number of iterations is that of all methods.
+    def __init__(self, compliance: np.ndarray):
+        self.product = compliance.__matmul__
+        self.self_compliance = float(compliance.diagonal().mean())
+
+    def precondition(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the forces (n,) [N] of nodes without coupling for displacements (n,) [m]."""
+        return displacement / self.self_compliance
+
+
+def solve_by_gradients(
+    compliance: np.ndarray, problem: ContactProblem
+) -> "bounded.BoundedSolution":
+    """Solve a contact problem by conjugate gradients, up to `GRADIENT_RESIDUAL_TOL`.
 
     Parameters
     ----------
-    compliance : StripCompliance
+    compliance : (n, n) ndarray
         Compliance [m/N] of the nodes.
     problem : ContactProblem
-        Gap [m], motions and loads of the nodes.
-    max_iterations : int
-        Largest number of contact sets that the primal-dual method tries from each start.
+        Gap [m], motions, loads and springs.
 
     Returns
     -------
-    solution : SetSolution
-    n_iterations : int
-        Number of contact sets and of gradient steps of all methods.
+    BoundedSolution
+        Forces (n,) [N] in place of tractions.
     """
-    every_node = np.ones(problem.gap.size, bool)
-    solution, n_first = solve_primal_dual(compliance, problem, every_node, max_iterations)
-    if solution is not None and compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
-        return solution, n_first
-
-    force, _, _, n_second, _ = bounded.solve_nodal_forces(compliance, problem)
-    # Smaller forces are remainders that the gradient steps have not yet removed.
-    is_loaded = force > 1e-9 * force.max()
-    solution, n_third = solve_primal_dual(compliance, problem, is_loaded, max_iterations)
-    n_iterations = n_first + n_second + n_third
-    if solution is not None and compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
-        return solution, n_iterations
-    solution, n_last = solve_primal(compliance, problem, force)
-    return solution, n_iterations + n_last
+    program = bounded.BoundedProblem(
+        problem.gap, 0.0, np.inf, problem.motions.T, problem.target, problem.springs
+    )
+    operator = _NodalCompliance(compliance)
+    return bounded.solve_bounded(operator, program, tolerance=GRADIENT_RESIDUAL_TOL)
 
 
-def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float):
+def _solve_on_one_node(
+    compliance, problem: ContactProblem, rest_rotation: float
+) -> SetSolution | None:
     """Solve a patch that touches at a single node, or return None if no node qualifies.
 
     The node lies under the load line. Any rotation that leaves the other nodes open is a solution. It is that without
@@ -103,7 +100,7 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
 
     Parameters
     ----------
-    compliance
+    compliance : (n, n) ndarray
         Compliance of the nodes [m/N].
     problem : ContactProblem
         Gap, motions of the holder and prescribed load and moment.
@@ -120,7 +117,7 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
     # Opening of the other nodes without rotation, and the rotation at which each of them would touch
     force = np.zeros(gap.size)
     force[node] = load
-    displacement = compliance.product(force)
+    displacement = compliance @ force
     arm = position - position[node]
     height = gap - gap[node] + displacement - displacement[node]
     noise = OPENING_ROUND_OFF * (np.abs(gap) + abs(displacement[node]))
@@ -143,14 +140,14 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
     )
 
 
-def _solve_as_one_case(
-    compliance: StripCompliance, problem: ContactProblem, start: np.ndarray
+def solve_on_table(
+    compliance: np.ndarray, problem: ContactProblem, start: np.ndarray
 ) -> tuple[SetSolution | None, int]:
-    """Solve a patch that is a single strip as the only case of a table of contact sets.
+    """Solve a contact problem as the only case of a table of contact sets.
 
     Parameters
     ----------
-    compliance : StripCompliance
+    compliance : (n, n) ndarray
         Compliance [m/N] of the nodes.
     problem : ContactProblem
         Gap [m], motions and loads of the nodes.
@@ -169,10 +166,7 @@ def _solve_as_one_case(
     columns[0] = 1.0
     columns[1:n_motions] = problem.motions.T[1:]
     columns[2] = problem.gap
-    own = compliance.common
-    if compliance.added is not None:
-        own = own + np.diag(compliance.added[0])
-    table = SetTable(own, columns, problem.gap.size, has_ends=False)
+    table = SetTable(compliance, columns, problem.gap.size, has_ends=False)
 
     # A prescribed approach is contained in the gap
     load, moment = np.append(problem.target, [np.nan, np.nan])[:2]
@@ -185,22 +179,34 @@ def _solve_as_one_case(
 
     unknown = table.combine(pressed.slot, pressed.closing)[0]
     active = table.active[pressed.slot[0]]
-    scale = np.abs(pressed.closing[0]) @ np.abs(columns)
-    return SetSolution(
+    solution = SetSolution(
         force=np.where(active, unknown, 0.0),
         opening=np.where(active, 0.0, unknown),
-        scale=scale,
+        scale=np.abs(pressed.closing[0]) @ np.abs(columns),
         motion=pressed.closing[0, :n_motions],
-    ), table.n_sets
+    )
+    if not compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
+        return None, table.n_sets
+    return solution, table.n_sets
+
+
+def _guess_contact_set(compliance: np.ndarray, problem: ContactProblem) -> np.ndarray:
+    """Guess the nodes in contact (n,) of a problem from the gap between rigid pieces in equilibrium.
+
+    The closing is estimated as the geometric mean of the deflections under a point load and under a uniform load.
+    Under a prescribed approach these are the nodes that overlap. `compliance` (n, n) [m/N] is that of the nodes.
+    """
+    gap = problem.gap
+    if not problem.target.size:
+        return gap < 0
+    unit_depth = np.sqrt(np.abs(compliance.diagonal().mean() * compliance.mean()))
+    return gap <= gap.min() + problem.target[0] * unit_depth
 
 
 def solve(
-    compliance: StripCompliance,
-    problem: ContactProblem,
-    start: np.ndarray | None = None,
-    max_iterations: int = 100,
+    compliance: np.ndarray, problem: ContactProblem, start: np.ndarray | None = None
 ) -> ContactSolution:
-    """Solve a contact problem of a patch or of several strips.
+    """Solve the contact problem of a patch.
 
     The forces are those of a strictly convex quadratic program, so that neither the set from which the search starts
     nor the method that finds them changes them. The residuals of every pressed patch are computed anew
@@ -208,14 +214,12 @@ def solve(
 
     Parameters
     ----------
-    compliance : StripCompliance
-        C, positive definite.
+    compliance : (n, n) ndarray
+        C [m/N], positive definite.
     problem : ContactProblem
         Without a free rotation, its gap [m] is measured from a point near the contact: an offset costs digits.
     start : (n,) bool ndarray, optional
         Contact set of a similar problem, which saves iterations.
-    max_iterations : int
-        Number of sets that the primal-dual method may try each time.
 
     Returns
     -------
@@ -240,25 +244,23 @@ def solve(
     # A patch that may rotate freely can rest on a single node, whose set does not determine the rotation
     solution = None
     n_iterations = 0
-    is_patch = problem.gap.size == len(compliance.common)
-    if is_patch and problem.min_nodes == 2:
+    if problem.has_free_rotation:
         solution = _solve_on_one_node(compliance, problem, rest_motion[1])
-
     if solution is None:
         if start is None or np.count_nonzero(start) < problem.min_nodes:
-            start = guess_contact_set(compliance, problem)
-        if is_patch:
-            solution, n_iterations = _solve_as_one_case(compliance, problem, start)
-        else:
-            solution, n_iterations = solve_primal_dual(compliance, problem, start, max_iterations)
-        if solution is None or not compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
-            solution, n_more = _solve_by_fallbacks(compliance, problem, max_iterations)
-            n_iterations += n_more
+            start = _guess_contact_set(compliance, problem)
+        solution, n_iterations = solve_on_table(compliance, problem, start)
+
+    # The primal method always ends; from the forces of the gradients it takes few steps
+    if solution is None:
+        by_gradients = solve_by_gradients(compliance, problem)
+        solution, n_sets = solve_primal(compliance, problem, by_gradients.traction)
+        n_iterations += by_gradients.n_iterations + n_sets
     return ContactSolution(solution.force, solution.motion + rest_motion, n_iterations)
 
 
 def compute_residuals(
-    compliance: StripCompliance, problem: ContactProblem, solution: ContactSolution
+    compliance: np.ndarray, problem: ContactProblem, solution: ContactSolution
 ) -> dict[str, float]:
     """Compute the relative residuals of the contact conditions for a solution.
 
@@ -267,8 +269,8 @@ def compute_residuals(
 
     Parameters
     ----------
-    compliance : StripCompliance
-        C of the problem.
+    compliance : (n, n) ndarray
+        C [m/N] of the problem.
     problem : ContactProblem
         Gap [m], motions and loads as they were given.
     solution : ContactSolution
@@ -280,10 +282,9 @@ def compute_residuals(
         penetration, tension, complementarity, and the balances of `compute_balances`.
     """
     force = solution.force
-    magnitudes = replace(compliance, common=np.abs(compliance.common))
-    opening = problem.gap - problem.motions @ solution.motion + compliance.product(force)
+    opening = problem.gap - problem.motions @ solution.motion + compliance @ force
     scale = np.abs(problem.gap) + np.abs(problem.motions) @ np.abs(solution.motion)
-    scale += magnitudes.product(np.abs(force))
+    scale += np.abs(compliance) @ np.abs(force)
     relative_opening = opening / np.where(scale > 0, scale, 1.0)
     load = max(force.sum(), MIN_TOTAL_FORCE)
     residuals = {
@@ -297,9 +298,9 @@ def compute_residuals(
 
 
 def compute_balances(problem: ContactProblem, solution) -> dict[str, float]:
-    """Compute the relative residuals of the balance of load and moments.
+    """Compute the relative residuals of the balance of load and moment, as far as they are prescribed.
 
-    A moment is relative to the load times the length over which its axis varies, plus the moment of the spring.
+    A moment is relative to the load times the length of the interface, plus the moment of the spring.
 
     Parameters
     ----------
@@ -311,37 +312,31 @@ def compute_balances(problem: ContactProblem, solution) -> dict[str, float]:
     Returns
     -------
     dict of float
-        force_balance, moment_balance of a rotation about y and roll_balance of a roll, as far as they are free.
+        force_balance and moment_balance.
     """
-    out = {}
-    for k, (target, spring) in enumerate(zip(problem.target, problem.springs)):
-        arm = problem.motions[:, k]
-        spring_moment = spring * solution.motion[k]
-        error = abs(target - arm @ solution.force - spring_moment)
-        if k == 0:
-            out["force_balance"] = float(error / target)
-            continue
-        # The arm of a roll is the same at neighbouring nodes of a strip.
-        name = "moment_balance" if arm[0] != arm[1] else "roll_balance"
-        scale = problem.target[0] * np.ptp(arm) + abs(spring_moment)
-        out[name] = float(error / scale)
-    return out
+    if not problem.target.size:
+        return {}
+    spring_load = problem.springs * solution.motion
+    error = np.abs(problem.target - problem.motions.T @ solution.force - spring_load)
+    scale = problem.target[0] * np.ptp(problem.motions, axis=0) + np.abs(spring_load)
+    scale[0] = problem.target[0]
+    return dict(zip(("force_balance", "moment_balance"), (error / scale).tolist()))
 
 
-def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
+def explain_singular_set(compliance: np.ndarray, problem: ContactProblem) -> str:
     """Return the error message for a contact set whose equations are singular.
 
     A prescribed rotation is determined by any node in contact, so only the compliance itself can be at fault.
 
     Parameters
     ----------
-    c : (m, m) ndarray
+    compliance : (n, n) ndarray
         Compliance of the pieces [m/N].
     problem : ContactProblem
         Problem whose equations are singular.
     """
     try:
-        factorise(np.array(c, order="C"))
+        factorise(np.array(compliance, order="C"))
     except np.linalg.LinAlgError:
         return INDEFINITE_COMPLIANCE_MESSAGE
     if problem.target.size < 2:
@@ -349,7 +344,7 @@ def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
             "contact: numbers in the contact equations became too large to compute; check the units and magnitudes "
             "of load, gap and stiffnesses"
         )
-    holder = "name" if problem.free_rotations else "raise"
+    holder = "name" if problem.has_free_rotation else "raise"
     return (
         "contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "
         f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness"

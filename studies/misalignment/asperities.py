@@ -18,14 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import contact_forms as exact
 from halfspace import press_periodic
 
-from patchfem.contact import (
-    HertzAsperities,
-    Holder,
-    StripCompliance,
-    StripLayout,
-    StripModel,
-    press_strips,
-)
+from patchfem.contact import HertzAsperities, Holder, press_patch
+from patchfem.core import Compliance, Interface
 
 CARBIDE = (250e9, 0.24)  # Young's modulus [Pa] and Poisson's ratio in rig.toml
 TITANIUM = (121e9, 0.32)  # Young's modulus [Pa] and Poisson's ratio in rig.toml
@@ -145,14 +139,14 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE) -> tuple:
         c = between_ridges(count, coat)[(number[:, None] - number) % count]
     force = np.full(count, MEAN * cell)
     last = 0.0
-    layout = StripLayout(number.astype(float), np.ones(count), np.zeros(1))
+    interface = Interface(number.astype(float), np.ones(count), 1.0)
     holder = Holder(MEAN * cell * count)
     # secant iteration of the force on each peak; each iteration reduces the error to a third or less
     while np.abs(force - last).max() > 1e-11 * force.max():
         last = force
         soft = np.maximum(force, 1e-9 * force.max())
-        compliance = StripCompliance(c + np.diag(own(soft, modulus)[0] / soft))
-        force = press_strips(StripModel(compliance, layout), depth, holder).force[0]
+        softened = c + np.diag(own(soft, modulus)[0] / soft)
+        force = press_patch(Compliance(interface, softened, softened), depth, holder).force
     live = np.flatnonzero(force > 0)
     tangent = c[np.ix_(live, live)] + np.diag(own(force[live], modulus)[1])
     return float(np.linalg.solve(tangent, np.ones(live.size)).sum() / (count * cell)), force

@@ -37,14 +37,7 @@ import contact_forms as exact
 import tilted
 from asperities import MEAN
 
-from patchfem.contact import (
-    Holder,
-    LinearAsperities,
-    StripCompliance,
-    StripLayout,
-    StripModel,
-    press_strips,
-)
+from patchfem.contact import Holder, LinearAsperities, press_patch
 
 SCATTERS = (0.0, 10e-9, 50e-9, 0.2e-6, 1e-6, 5e-6)
 SHAPES = ("uniform", "gaussian")
@@ -56,11 +49,10 @@ def opening(stiffness: float | None) -> float:
     pieces = tilted.pair(2).compliance
     x = pieces.interface.x
     layer = None if stiffness is None else LinearAsperities(stiffness)
-    layout = StripLayout(x, pieces.interface.weight, np.zeros(1))
-    model = StripModel(StripCompliance(pieces.normal), layout, layer)
     holder = Holder(tilted.case(0.0).loading.load)
     # at both tilts the whole length is in contact
-    even, turn = (press_strips(model, by * x, holder).pressure[0] for by in (0.0, 1e-7))
+    states = [press_patch(pieces, by * x, holder, layer) for by in (0.0, 1e-7)]
+    even, turn = (state.force / pieces.interface.weight for state in states)
     return float(1e-7 * (even / np.maximum(even - turn, 1e-300)).min())
 
 

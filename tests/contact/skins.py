@@ -1,29 +1,17 @@
-"""Asperity layers between two bodies: smooth laws are solved as one strip, the linear law as softer bodies."""
+"""Patches with asperity layers between two bodies."""
 
 from dataclasses import replace
 
-from patchfem.contact import (
-    ExponentialAsperities,
-    Holder,
-    StripCompliance,
-    StripLayout,
-    StripModel,
-)
-from patchfem.contact import press_strips as press_by_holder
+import numpy as np
+
+from patchfem.contact import ExponentialAsperities, Holder, press_patch
+from patchfem.core import Compliance, Interface
 
 
-def make_strips(c, x, weight, offsets, asperities=None):
-    """Return strips with a compliance given as an array, or as a compliance with separate diagonals."""
-    compliance = c if isinstance(c, StripCompliance) else StripCompliance(c)
-    return StripModel(compliance, StripLayout(x, weight, offsets), asperities)
-
-
-def press_strips(
-    c, x, weight, offsets, gap, roll=0.0, load=None, moment=None, asperities=None, **control
-):
-    """Return the state of strips under a load and its moments, or by an approach."""
-    strips = make_strips(c, x, weight, offsets, asperities)
-    return press_by_holder(strips, gap, Holder(load, moment=moment, roll=roll, **control))
+def press_layer(c, x, weight, gap, asperities=None, **holder):
+    """Return the state of a patch with a compliance (m, m) [m/N] that a `Holder` presses."""
+    pieces = Compliance(Interface(x, np.asarray(weight), 1.0), c, c)
+    return press_patch(pieces, gap, Holder(**holder), asperities)
 
 
 def stretch_law(law, factor: float):

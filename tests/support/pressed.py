@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from patchfem.contact import Holder, StripCompliance, StripLayout, StripModel, press_strips
-from patchfem.contact.active_set import make_patch_problem
+from patchfem.contact import Holder, press_patch
+from patchfem.contact.active_set import make_problem
 from patchfem.contact.unilateral import solve
 from patchfem.core import Compliance, Outcome
 
@@ -26,17 +26,16 @@ class PressedPatch(NamedTuple):
 
 def press_by_holder(pieces: Compliance, gap, holder: Holder) -> PressedPatch:
     """Press two bare pieces by a holder."""
-    layout = StripLayout(pieces.interface.x, pieces.interface.weight, np.zeros(1))
-    state = press_strips(StripModel(StripCompliance(pieces.normal), layout), gap, holder)
+    state = press_patch(pieces, gap, holder)
     return PressedPatch(
-        state.pressure[0],
-        state.gap[0],
-        state.position.delta,
-        state.position.theta,
+        state.force / pieces.interface.weight,
+        state.gap,
+        state.approach,
+        state.rotation,
         state.load,
-        state.moment,
+        float(state.force @ pieces.interface.x),
         state.outcome,
-        state.iterations,
+        state.n_iterations,
         state.residuals,
     )
 
@@ -77,7 +76,7 @@ def solve_forces(c, x, gap, target) -> PlainSolution:
     PlainSolution
     """
     touch_approach = gap.min() if target.size else 0.0
-    problem = make_patch_problem(x, gap - touch_approach, *map(float, target))
-    solution = solve(StripCompliance(c), problem)
+    problem = make_problem(x, gap - touch_approach, *map(float, target))
+    solution = solve(c, problem)
     solution.motion[:1] += touch_approach
     return PlainSolution(solution.force, solution.motion, solution.n_iterations)

@@ -59,7 +59,7 @@ class ContactPlaces(NamedTuple):
 
 
 def find_contact_places(pressed: PressedCases) -> ContactPlaces:
-    """Return where the contacts of pressed cases without strips begin and end."""
+    """Return where the contacts of pressed cases begin and end along the interface."""
     edges = find_contact_edges(pressed)
     x = pressed.x
     crossings = x[edges.node] + edges.fraction * (x[edges.node + edges.side] - x[edges.node])

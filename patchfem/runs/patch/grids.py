@@ -439,11 +439,11 @@ def find_contact_extent(pressed: PressedCases, case: int) -> ContactExtent:
         Number of the case.
     """
     x = pressed.x
-    strips = pressed.pressure[case]
-    is_loaded = strips > (1e-3 * strips.max() if pressed.level.is_smooth else 0.0)
-    loaded_nodes = np.flatnonzero(is_loaded.any(axis=0))
+    pressure = pressed.pressure[case]
+    is_loaded = pressure > (1e-3 * pressure.max() if pressed.level.is_smooth else 0.0)
+    loaded_nodes = np.flatnonzero(is_loaded)
     if not loaded_nodes.size:
-        loaded_nodes = np.array([np.argmin(pressed.gap[case].min(axis=0))])
+        loaded_nodes = np.array([np.argmin(pressed.gap[case])])
     low = x[max(loaded_nodes[0] - 1, 0)]
     high = x[min(loaded_nodes[-1] + 1, x.size - 1)]
 
@@ -453,7 +453,7 @@ def find_contact_extent(pressed: PressedCases, case: int) -> ContactExtent:
 
     # An edge lies in the cell between a loaded and a free node; the solver knows it more
     # accurately.
-    edge_cells = np.flatnonzero((is_loaded[:, 1:] != is_loaded[:, :-1]).any(axis=0))
+    edge_cells = np.flatnonzero(is_loaded[1:] != is_loaded[:-1])
     edge_positions = (x[edge_cells] + x[edge_cells + 1]) / 2
     cells = np.diff(x)[edge_cells]
     if pressed.active[case].any():
@@ -461,7 +461,7 @@ def find_contact_extent(pressed: PressedCases, case: int) -> ContactExtent:
         if len(edges) == edge_cells.size:
             edge_positions = np.array([end.position for end in edges])
 
-    corners = tuple(float(x[at]) for at in (0, -1) if is_loaded[:, at].any())
+    corners = tuple(float(x[at]) for at in (0, -1) if is_loaded[at])
     low = edge_positions[0] if loaded_nodes[0] else x[0]
     high = edge_positions[-1] if loaded_nodes[-1] < x.size - 1 else x[-1]
     return ContactExtent(
@@ -469,7 +469,7 @@ def find_contact_extent(pressed: PressedCases, case: int) -> ContactExtent:
         tuple(edge_positions.tolist()),
         corners,
         float(cells.max(initial=0.0)),
-        _find_pressure_maxima(x, pressed.mean_pressure[case]),
+        _find_pressure_maxima(x, pressed.contact_pressure[case]),
     )
 
 

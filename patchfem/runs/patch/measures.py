@@ -86,7 +86,7 @@ def collect_mesh_values(pressed: PressedCases) -> MeshValues:
     """Return what the error estimate needs of pressed cases."""
     active = pressed.active
     begins = active & np.diff(active, axis=1, prepend=False)
-    end_pressure = pressed.mean_pressure[:, [0, -1]].max(axis=1)
+    end_pressure = pressed.contact_pressure[:, [0, -1]].max(axis=1)
     return MeshValues(
         pressed.level.pair, compute_values(pressed), np.count_nonzero(begins, axis=1), end_pressure
     )
@@ -485,11 +485,11 @@ def _find_unbounded_pressure(pressed: PressedCases) -> dict[str, np.ndarray]:
     patch_model = pressed.level.model
     x = pressed.x
     cells = np.diff(x)
-    is_loaded = pressed.is_loaded.any(axis=1)
-    masks = [is_loaded[:, [0, -1]].any(axis=1)] if patch_model.has_singular_ends else []
+    active = pressed.active
+    masks = [active[:, [0, -1]].any(axis=1)] if patch_model.has_singular_ends else []
     for jump in patch_model.gap.step_edges:
         cell = cells[np.clip(np.searchsorted(x, jump), 1, cells.size) - 1]
-        masks.append(is_loaded[:, np.abs(x - jump) <= 1.5 * cell].any(axis=1))
+        masks.append(active[:, np.abs(x - jump) <= 1.5 * cell].any(axis=1))
     return dict(zip(list_unbounded_pressure_reasons(patch_model), masks))
 
 
@@ -561,13 +561,12 @@ def _compute_resolution(pressed: PressedCases, missed_peak) -> Resolution:
         thicknesses = [grid.coating_thickness for grid in (pair.grid, pair.upper_grid)]
         thinnest = min((thickness for thickness in thicknesses if thickness > 0), default=np.inf)
         fraction = np.minimum(1.0, (all_cells[[0, -1]] / thinnest) ** 2)
-        end_pressure = pressed.mean_pressure[:, [0, -1]]
+        end_pressure = pressed.contact_pressure[:, [0, -1]]
         corner_pressure = (MISSED_CORNER_PRESSURE_FRACTION * end_pressure * fraction).max(axis=1)
 
     # The elastic displacement is the gap under load less that of rigid pieces in the same position
-    rigid = pressed.unloaded_gap - holder.approach[:, None, None]
-    rigid = rigid + holder.turn[:, None, None] * pressed.x
-    displacement = np.abs(pressed.gap - rigid).max(axis=(1, 2))
+    rigid = pressed.unloaded_gap - holder.approach[:, None] + holder.turn[:, None] * pressed.x
+    displacement = np.abs(pressed.gap - rigid).max(axis=1)
 
     n_nodes = np.maximum(active.sum(axis=1), 1)
     is_unresolved = (n_nodes <= MAX_UNRESOLVED_CONTACT_NODES) & (edge_cells > 0)
@@ -581,7 +580,7 @@ def _compute_resolution(pressed: PressedCases, missed_peak) -> Resolution:
         edge_cells=edge_cells,
         edge_offset=edge_offset,
         can_rotate=holder.can_rotate,
-        closing=np.ptp(pressed.unloaded_gap, axis=(1, 2)) + displacement,
+        closing=np.ptp(pressed.unloaded_gap, axis=1) + displacement,
         corner_pressure=corner_pressure,
         wedge_pressure=np.where(is_unresolved, _wedge_indentation_pressure(pressed), 0.0),
         rounding_pressure=missed_peak,
@@ -680,7 +679,7 @@ def _wedge_indentation_pressure(pressed: PressedCases) -> np.ndarray:
     """
     active = pressed.active
     is_end = active[:, 1:] != active[:, :-1]
-    slopes = np.abs(np.diff(pressed.unloaded_gap)).max(axis=1) / np.diff(pressed.x)
+    slopes = np.abs(np.diff(pressed.unloaded_gap)) / np.diff(pressed.x)
     flexibility = 0
     for piece in (pressed.level.pair.piece, pressed.level.pair.upper):
         young, nu = max(piece.layers.coating, piece.layers.substrate)

@@ -13,18 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...contact.press import (
-    Holder,
-    StripLayout,
-    StripModel,
-    StripProperties,
-    StripsState,
-    press_strips,
-    split_into_strips,
-)
+from ...contact.press import Holder, PatchState, press_patch
 from ...contact.press_cases import press_on_table
 from ...contact.set_table import SetTable
-from ...contact.strip_compliance import StripCompliance
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...elasticity.lapack import use_one_blas_thread
 from ...exceptions import UnresolvedTrace
@@ -98,24 +89,25 @@ class Level:
         """Whether a nonlinear asperity layer carries pressure at every separation."""
         return self.has_layer and self.model.interface.skin.law != "linear"
 
-    @cached_property
-    def strip(self) -> StripProperties:
-        """Compliance [m/N] and nodal areas [m2] of one strip of the pieces, without layer."""
-        return split_into_strips(self.pair.compliance, 1)
+    @property
+    def area(self) -> np.ndarray:
+        """Areas (m,) [m2] of the nodes."""
+        return self.pair.compliance.interface.weight
 
     @cached_property
     def linear_layer(self) -> np.ndarray | None:
-        """Compliance (m,) [m/N] of a linear asperity layer at the nodes of a strip; None without such a layer."""
+        """Compliance (m,) [m/N] of a linear asperity layer at the nodes; None without such a layer."""
         if not self.has_layer or self.is_smooth:
             return None
-        return 1 / (self.model.interface.skin.normal_stiffness * self.strip.weight)
+        return 1 / (self.model.interface.skin.normal_stiffness * self.area)
 
     def add_layer(self, layer) -> tuple[np.ndarray, np.ndarray]:
-        """Return normal compliance (m, m) and shear compliance of one strip with a layer (m,) [m/N], or None, in series.
+        """Return normal compliance (m, m) and shear compliance of the pieces with a layer (m,) [m/N], or None, in series.
 
         The shear compliance (b m, b m) of unlike pieces contains the normal one and the coupling of both (b = 2).
         """
-        normal, tangential, _ = self.strip
+        normal = self.pair.compliance.normal
+        tangential = self.pair.compliance.tangential
         if layer is not None:
             normal = normal + np.diag(layer)
             ratio = self.model.interface.skin.tangential_ratio
@@ -163,26 +155,24 @@ class HolderPositions(NamedTuple):
     - approach, rotation (n,): approach [m] and rotation [rad].
     - turn (n,): part of the rotation [rad] that the unloaded gap does not contain.
     - can_rotate (n,): whether the rotation is free.
-    - roll (n,): rotation [rad] about the x axis.
     """
 
     approach: np.ndarray
     rotation: np.ndarray
     turn: np.ndarray
     can_rotate: np.ndarray
-    roll: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class PressedCases:
-    """Contact of n cases at the m nodes of a mesh; a patch in strips has s strips of them.
+    """Contact of n cases at the m nodes of a mesh.
 
     - level: pieces on the mesh.
-    - force (n, s, m): nodal forces [N] >= 0, 0 of a case that failed.
-    - gap (n, s, m): gap under load [m]; with a smooth asperity law the separation of the mean planes.
-    - unloaded_gap (n, s, m): gap of the unloaded surfaces [m].
+    - force (n, m): nodal forces [N] >= 0, 0 of a case that failed.
+    - gap (n, m): gap under load [m]; with a smooth asperity law the separation of the mean planes.
+    - unloaded_gap (n, m): gap of the unloaded surfaces [m].
     - holder: position of the upper holder.
-    - layer (n, s, m): compliance [m/N] of the asperity layer; None without a layer.
+    - layer (n, m): compliance [m/N] of the asperity layer; None without a layer.
     - variants: for a gap with a step at a node: (weights (n,), the cases with this node on the higher side of the
       step), and the same on the lower side; else ().
     """
@@ -206,49 +196,38 @@ class PressedCases:
 
     @cached_property
     def pressure(self) -> np.ndarray:
-        """Pressures (n, s, m) [Pa] of the strips."""
-        return self.force / self.level.strip.weight
+        """Pressures (n, m) [Pa]."""
+        return self.force / self.level.area
 
     @cached_property
-    def is_loaded(self) -> np.ndarray:
-        """Whether each node of each strip carries pressure (n, s, m), in a smooth layer a fraction of the peak."""
+    def active(self) -> np.ndarray:
+        """Contact sets (n, m): nodes that carry pressure, in a smooth layer more than a tiny fraction of the peak."""
         if not self.level.is_smooth:
             return self.force > 0
-        peak = self.pressure.max(axis=(1, 2), keepdims=True)
+        peak = self.pressure.max(axis=1, keepdims=True)
         return self.pressure > edges.MIN_CONTACT_PRESSURE_RATIO * peak
 
     @cached_property
-    def mean_pressure(self) -> np.ndarray:
-        """Pressures (n, m) [Pa], means over the strips; pressures of a smooth layer that count as none are 0."""
-        return np.where(self.is_loaded, self.pressure, 0.0).mean(axis=1)
-
-    @property
-    def active(self) -> np.ndarray:
-        """Contact sets (n, m): whether any strip carries pressure at a node."""
-        return self.mean_pressure > 0
+    def contact_pressure(self) -> np.ndarray:
+        """Pressures (n, m) [Pa] of the nodes in contact, 0 elsewhere."""
+        return np.where(self.active, self.pressure, 0.0)
 
     @cached_property
     def load(self) -> np.ndarray:
         """Normal loads (n,) [N]."""
-        return self.force.sum(axis=(1, 2))
+        return self.force.sum(axis=1)
 
     @cached_property
     def moment(self) -> np.ndarray:
         """Moments (n,) [N m] of the pressure about x = 0."""
-        return (self.force @ self.x).sum(axis=1)
+        return self.force @ self.x
 
     @cached_property
     def layer_fraction(self) -> np.ndarray | None:
         """Fraction (n, m) of the nodal compliance due to the asperity layer; None without a layer."""
         if self.layer is None:
             return None
-        bare = np.diag(self.level.strip.normal)
-        layer = self.layer.min(axis=1)
-        return layer / (bare + layer)
-
-    def flatten(self, values: np.ndarray) -> np.ndarray:
-        """Return values (n s, m) of all strips one after the other."""
-        return values.reshape(-1, values.shape[-1])
+        return self.layer / (self.level.pair.compliance.normal.diagonal() + self.layer)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -262,7 +241,6 @@ class Patch:
     - pieces: Compliance including the asperity layer of the patch, a nonlinear layer being linearised
       at the operating point.
     - pressure: ContactState.
-    - state: StripsState of a single strip.
     - slip_compliance (m, m): tangential compliance [m/N] of nodes that slip one by one: that of
       the asperity layer, that of the pieces if the scene has [contact.shear], and that of the
       holder spring, which is equal in all entries.
@@ -281,7 +259,6 @@ class Patch:
     pair: CondensedPair
     pieces: Compliance
     pressure: ContactState
-    state: StripsState
     slip_compliance: np.ndarray
     unloaded_gap: np.ndarray
     notes: tuple[str, ...] = ()
@@ -371,7 +348,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
         Model whose gap, load and asperity layer are used.
     pair : CondensedPair
         Condensed pieces, on whose nodes the contact is solved.
-    worn : (m,) or (s, m), optional
+    worn : (m,) ndarray, optional
         Worn depth [m], which is added to the gap.
     coarse : Patch, optional
         Solution on another mesh, from whose contact set the search starts.
@@ -398,8 +375,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
 
     start = None
     if coarse is not None:
-        rows = [np.interp(x, coarse.x, row > 0) for row in coarse.state.force]
-        start = np.array(rows) > 0.5
+        start = np.interp(x, coarse.x, coarse.pressed.force[0] > 0) > 0.5
 
     begin = process_time()
     level = Level(patch_model, pair, np.zeros((0, x.size)))
@@ -417,35 +393,28 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     return replace(_make_patch(patch_model, pressed, state, gap), notes=notes, seconds=times)
 
 
-def _make_single_case(level: Level, gap, state: StripsState) -> PressedCases:
+def _make_single_case(level: Level, gap: np.ndarray, state: PatchState) -> PressedCases:
     """Return a solved patch as a single case.
 
     Parameters
     ----------
     level : Level
         Pieces on the mesh.
-    gap : (m,) or (s, m)
+    gap : (m,) ndarray
         Unloaded gap [m].
-    state : StripsState
+    state : PatchState
         Solution on the nodes of the pieces.
     """
     layer = None
     if level.has_layer:
-        layer = compute_layer_compliance(level.model.interface.skin, state)[None]
-    return PressedCases(
-        level,
-        state.force[None],
-        state.gap[None],
-        np.broadcast_to(gap, state.gap.shape)[None],
-        HolderPositions(
-            np.array([state.position.delta]),
-            np.array([state.position.theta]),
-            np.array([state.position.theta - level.model.gap.angle]),
-            np.array([level.model.loading.moment is not None]),
-            np.array([state.position.roll]),
-        ),
-        layer,
+        layer = compute_layer_compliance(level, state)[None]
+    holder = HolderPositions(
+        approach=np.array([state.approach]),
+        rotation=np.array([state.rotation]),
+        turn=np.array([state.rotation - level.model.gap.angle]),
+        can_rotate=np.array([level.model.loading.moment is not None]),
     )
+    return PressedCases(level, state.force[None], state.gap[None], gap[None], holder, layer)
 
 
 def _list_step_variants(pressed: PressedCases, unworn_gap, half_steps, worn):
@@ -460,13 +429,13 @@ def _list_step_variants(pressed: PressedCases, unworn_gap, half_steps, worn):
         The patch with the node at half the height of the step.
     unworn_gap, half_steps : (m,) ndarray
         Gap before wear, and half the height of the step at its node [m].
-    worn : (m,) or (s, m) ndarray
+    worn : (m,) ndarray
         Worn depth [m].
 
     Returns
     -------
     list of tuple
-        (weight (1,), gap (m,) or (s, m) [m]) for both sides.
+        (weight (1,), gap (m,) [m]) for both sides.
     """
     node = int(np.argmax(half_steps))
     weight_shift = compute_step_weight_shift(pressed, node)
@@ -478,7 +447,7 @@ def _list_step_variants(pressed: PressedCases, unworn_gap, half_steps, worn):
     variants = []
     for side, neighbour in zip((-1, 1), neighbours):
         moved = unworn_gap + side * half_steps + worn
-        moved[..., node] += worn[..., neighbour] - worn[..., node]
+        moved[node] += worn[neighbour] - worn[node]
         variants.append((0.5 - side * weight_shift, moved))
     return variants
 
@@ -495,7 +464,7 @@ def compute_step_weight_shift(pressed: PressedCases, node: int) -> np.ndarray:
     return shift * (1 - pressed.layer_fraction[:, node])
 
 
-def _make_patch(patch_model, pressed: PressedCases, state: StripsState, gap) -> Patch:
+def _make_patch(patch_model, pressed: PressedCases, state: PatchState, gap: np.ndarray) -> Patch:
     """Return the Patch of a single case.
 
     Parameters
@@ -504,9 +473,9 @@ def _make_patch(patch_model, pressed: PressedCases, state: StripsState, gap) -> 
         Model that was solved.
     pressed : PressedCases
         The patch as a single case.
-    state : StripsState
-        The same solution with the position of the holder and the residuals.
-    gap : (m,) or (s, m)
+    state : PatchState
+        The same solution with its residuals.
+    gap : (m,) ndarray
         Unloaded gap [m].
     """
     pair = pressed.level.pair
@@ -514,16 +483,15 @@ def _make_patch(patch_model, pressed: PressedCases, state: StripsState, gap) -> 
     interface = patch_model.interface
     skin = interface.skin
 
-    # The fields of a patch are those of its only strip.
-    mean_state = ContactState(
-        frozen_array(pressed.mean_pressure[0]),
-        frozen_array(state.gap.min(axis=0)),
-        state.position.delta,
-        state.position.theta,
+    contact_state = ContactState(
+        frozen_array(pressed.contact_pressure[0]),
+        state.gap,
+        state.approach,
+        state.rotation,
         state.load,
-        state.moment,
+        float(pressed.moment[0]),
         state.outcome,
-        state.iterations,
+        state.n_iterations,
         state.residuals,
     )
 
@@ -531,7 +499,7 @@ def _make_patch(patch_model, pressed: PressedCases, state: StripsState, gap) -> 
     pieces = pair.compliance
     layer_shear = 0.0
     if skin is not None:
-        layer = np.diag(pressed.layer[0, 0])
+        layer = np.diag(pressed.layer[0])
         if skin.tangential_ratio is not None:
             layer_shear = layer / skin.tangential_ratio
         normal = frozen_array(pieces.normal + layer)
@@ -547,11 +515,10 @@ def _make_patch(patch_model, pressed: PressedCases, state: StripsState, gap) -> 
         patch_model,
         pair,
         pieces,
-        mean_state,
-        state,
+        contact_state,
         slip_compliance=slip_compliance,
         unloaded_gap=frozen_array(gap),
-        averaging=patch_model.gap.averaging_length(pieces.interface.x, mean_state.sigma_n > 0),
+        averaging=patch_model.gap.averaging_length(pieces.interface.x, contact_state.sigma_n > 0),
         pressed=pressed,
     )
 
@@ -573,7 +540,7 @@ def make_level(patch_model, pair: CondensedPair) -> Level:
 def press_on_level(
     level: Level, cases: Cases, start
 ) -> tuple[PressedCases, dict[int, PatchfemError]]:
-    """Press the cases of a group without strips on a mesh.
+    """Press the cases of a group on a mesh.
 
     Cases whose contact set is not found on the table, and those with a smooth asperity layer, are pressed one by one.
 
@@ -611,15 +578,14 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
 
     The parameters and results are those of `press_on_level`.
     """
-    shape = (cases.n_cases, 1, level.x.size)
     holders = cases.holders
-    unloaded_gap = np.broadcast_to((cases.amplitudes @ level.shapes)[:, None], shape)
-    force = np.zeros(shape)
+    unloaded_gap = cases.amplitudes @ level.shapes
+    force = np.zeros(unloaded_gap.shape)
     gap = unloaded_gap.copy()
     layer = None
     if level.has_layer:
         own = 1.0 if level.is_smooth else level.linear_layer
-        layer = np.broadcast_to(own, shape).copy()
+        layer = np.broadcast_to(own, force.shape).copy()
     approach = np.zeros(cases.n_cases)
     turn = np.zeros(cases.n_cases)
     alone = np.arange(cases.n_cases)
@@ -631,8 +597,8 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
         slots = sets.slot[solved]
         unknown = table.combine(slots, sets.closing[solved])
         active = table.active[slots]
-        force[solved, 0] = np.where(active, unknown, 0.0)
-        gap[solved, 0] = np.where(active, 0.0, np.maximum(unknown, 0.0))
+        force[solved] = np.where(active, unknown, 0.0)
+        gap[solved] = np.where(active, 0.0, np.maximum(unknown, 0.0))
         approach[solved] = sets.closing[solved, 0]
         turn[solved] = -sets.closing[solved, 1]
         alone = np.flatnonzero(~sets.is_solved)
@@ -640,26 +606,22 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
     errors = {}
     for case in alone:
         try:
+            holder = _make_holder(cases, case)
             state = press_pieces(
-                level.model,
-                level.pair.compliance,
-                unloaded_gap[case],
-                holder=_make_holder(cases, case),
+                level.model, level.pair.compliance, unloaded_gap[case], holder=holder
             )
         except PatchfemError as error:
             errors[int(case)] = error
             continue
         force[case] = state.force
         gap[case] = state.gap
-        approach[case] = state.position.delta
-        turn[case] = state.position.theta - cases.rotation[case]
+        approach[case] = state.approach
+        turn[case] = state.rotation - cases.rotation[case]
         if layer is not None:
-            layer[case] = compute_layer_compliance(level.model.interface.skin, state)
+            layer[case] = compute_layer_compliance(level, state)
 
-    holder = HolderPositions(
-        approach, cases.rotation + turn, turn, holders.can_rotate, roll=np.zeros(cases.n_cases)
-    )
-    return PressedCases(level, force, gap, unloaded_gap, holder, layer), errors
+    positions = HolderPositions(approach, cases.rotation + turn, turn, holders.can_rotate)
+    return PressedCases(level, force, gap, unloaded_gap, positions, layer), errors
 
 
 def make_contact_force_function(patch_model, pair: CondensedPair):
@@ -677,20 +639,19 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
     gap = patch_model.gap.evaluate(pieces.interface.x).heights + pair.end_gap
 
     def compute_forces(worn, softening) -> np.ndarray:
-        """Return the contact forces [N] for a worn depth [m] and a softening [m/N]."""
-        added = np.atleast_2d(softening) if softening.any() else None
-        state = press_pieces(patch_model, pieces, gap + worn, added)
-        return state.force.reshape(np.shape(worn))
+        """Return the contact forces (m,) [N] for a worn depth (m,) [m] and a softening (m,) [m/N]."""
+        softened = pieces
+        if softening.any():
+            softened = replace(pieces, normal=pieces.normal + np.diag(softening))
+        return press_pieces(patch_model, softened, gap + worn).force
 
     return compute_forces
 
 
 def press_pieces(
-    patch_model, pieces: Compliance, gap, added=None, start=None, holder: Holder | None = None
-) -> StripsState:
+    patch_model, pieces: Compliance, gap: np.ndarray, start=None, holder: Holder | None = None
+) -> PatchState:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
-
-    The patch is the only strip of `contact.press`.
 
     Parameters
     ----------
@@ -698,30 +659,20 @@ def press_pieces(
         Model whose asperity layer, load and holder are used.
     pieces : Compliance
         Compliance of the pieces without asperity layer.
-    gap : (m,) or (s, m)
+    gap : (m,) ndarray
         Unloaded gap [m].
-    added : (s, m) ndarray, optional
-        What each strip adds to the diagonal of its compliance [m/N].
-    start : (s, m) ndarray of bool, optional
+    start : (m,) bool ndarray, optional
         Nodes in contact of a similar solution, from which the search starts.
     holder : Holder, optional
         Load and prescribed motions in place of those of the model.
 
     Returns
     -------
-    StripsState
+    PatchState
     """
-    strip = split_into_strips(pieces, 1)
-    offsets = np.zeros(1)
-
-    strips = StripModel(
-        StripCompliance(strip.normal, added),
-        StripLayout(pieces.interface.x, strip.weight, offsets),
-        None if patch_model.interface.skin is None else make_skin_law(patch_model),
-    )
-
+    law = None if patch_model.interface.skin is None else make_skin_law(patch_model)
     holder = holder or _make_holder(make_cases(patch_model, 1), 0)
-    return press_strips(strips, gap, holder, start)
+    return press_patch(pieces, gap, holder, law, start)
 
 
 def _make_holder(cases: Cases, case: int) -> Holder:
@@ -738,12 +689,12 @@ def _make_holder(cases: Cases, case: int) -> Holder:
     )
 
 
-def compute_layer_compliance(skin, state: StripsState) -> np.ndarray:
-    """Return the compliance (s, m) [m/N] of an asperity layer at the nodes of each strip of a contact state.
+def compute_layer_compliance(level: Level, state: PatchState) -> np.ndarray:
+    """Return the compliance (m,) [m/N] of the asperity layer of a level at the nodes of a contact state.
 
     A nonlinear law is linearised; the compliance of unloaded nodes is limited.
     """
-    if skin.law == "linear":
-        return np.broadcast_to(1 / (skin.normal_stiffness * state.layout.weight), state.force.shape)
-    stiffness = np.maximum(state.stiffness * state.layout.weight, 1e-300)
+    if not level.is_smooth:
+        return level.linear_layer
+    stiffness = np.maximum(state.layer_stiffness * level.area, 1e-300)
     return 1 / np.maximum(stiffness, edges.MIN_CONTACT_PRESSURE_RATIO * stiffness.max())

@@ -28,7 +28,7 @@ MIN_CELLS_ON_ROUNDED_END = 4
 class EdgeValues(NamedTuple):
     """Contact lengths and contact stiffnesses, which depend on the positions of the contact edges; numbers or (n,).
 
-    - length: length in contact [m]; the mean over the strips.
+    - length: length in contact [m].
     - width: distance between the outermost contact edges [m].
     - normal, tangential: stiffnesses [N/m].
     - rotational: stiffness [N m/rad].
@@ -195,41 +195,34 @@ def _compute_values(pressed: PressedCases) -> Arrays:
 
     level = pressed.level
     holder = pressed.holder
-    fraction = pressed.layer_fraction
-    if fraction is not None:
-        fraction = np.broadcast_to(fraction[:, None], pressed.pressure.shape)
-    values = assemble_static_values(
+    return assemble_static_values(
         np.ptp(pressed.x),
         level.pair.compliance.interface.weight.sum(),
         _CaseTotals(pressed.load, pressed.moment, holder.approach, holder.rotation),
-        estimate_peak_pressure(pressed.x, pressed.pressure, fraction).max(axis=1),
+        estimate_peak_pressure(pressed.x, pressed.pressure, pressed.layer_fraction),
         _compute_edge_values(pressed),
     )
-    return values
 
 
 def _compute_edge_values(pressed: PressedCases) -> EdgeValues:
-    """Return contact lengths and contact stiffnesses of pressed cases; those of their strips are summed.
+    """Return contact lengths and contact stiffnesses of pressed cases.
 
     All depend on where the contact ends between two nodes, which the nodal pressures show.
     """
-    shape = pressed.force.shape[:2]
-    row_edges = find_contact_edges(pressed)
-    intervals = edges.find_intervals(pressed.x, pressed.flatten(pressed.is_loaded), row_edges)
-    low, high = (ends.reshape(shape) for ends in intervals[1:])
-    width = np.fmax.reduce(high, axis=1) - np.fmin.reduce(low, axis=1)
-    normal, rotational, tangential = _compute_stiffnesses(pressed, row_edges)
+    contact_edges = find_contact_edges(pressed)
+    intervals = edges.find_intervals(pressed.x, pressed.active, contact_edges)
+    normal, rotational, tangential = _compute_stiffnesses(pressed, contact_edges)
     return EdgeValues(
-        length=intervals.length.reshape(shape).mean(axis=1),
-        width=np.nan_to_num(width),
-        normal=normal.reshape(shape).sum(axis=1),
-        tangential=tangential.reshape(shape).sum(axis=1),
-        rotational=rotational.reshape(shape).sum(axis=1),
+        length=intervals.length,
+        width=np.nan_to_num(intervals.high - intervals.low),
+        normal=normal,
+        tangential=tangential,
+        rotational=rotational,
     )
 
 
 def find_contact_edges(pressed: PressedCases) -> edges.ContactEdges:
-    """Return the contact edges of all strips (n s, e) of pressed cases, with their positions between two nodes."""
+    """Return the edges (n, e) of the contacts of pressed cases, with their positions between two nodes."""
     if "edges" in pressed.computed:
         return pressed.computed["edges"]
     level = pressed.level
@@ -237,14 +230,11 @@ def find_contact_edges(pressed: PressedCases) -> edges.ContactEdges:
 
     # A smooth layer has no gap, so that its edges follow from the pressure alone.
     if level.is_smooth:
-        pressure = pressed.pressure
-        threshold = edges.MIN_CONTACT_PRESSURE_RATIO * pressure.max(axis=(1, 2), keepdims=True)
-        threshold = np.broadcast_to(np.maximum(threshold, MIN_EDGE_PRESSURE), pressure.shape)
-        row_edges = edges.find_pressure_edges(
-            x, pressed.flatten(pressure), pressed.flatten(threshold)[:, :1]
-        )
+        peak = pressed.pressure.max(axis=1, keepdims=True)
+        threshold = np.maximum(edges.MIN_CONTACT_PRESSURE_RATIO * peak, MIN_EDGE_PRESSURE)
+        contact_edges = edges.find_pressure_edges(x, pressed.pressure, threshold)
     else:
-        active = pressed.flatten(pressed.is_loaded)
+        active = pressed.active
         table = level.tables[0]
         layer = level.linear_layer
         cells = edges.EdgeCells(
@@ -252,22 +242,20 @@ def find_contact_edges(pressed: PressedCases) -> edges.ContactEdges:
             level.pair.is_quadratic,
             None if layer is None else layer / np.diag(table.compliance),
         )
-        unknown = np.where(active, pressed.flatten(pressed.force), pressed.flatten(pressed.gap))
-        slots = table.find_slots(active)
-        rate = table.unknown[slots, 0]
-        row_edges = edges.find_edges(x, active, unknown, rate, cells)
+        unknown = np.where(active, pressed.force, pressed.gap)
+        rate = table.unknown[table.find_slots(active), 0]
+        contact_edges = edges.find_edges(x, active, unknown, rate, cells)
 
     # An edge next to a step of the gap lies on the step.
     steps = level.model.gap.step_edges
     if steps:
-        gap = pressed.flatten(pressed.unloaded_gap)
-        row_edges = edges.snap_to_steps(row_edges, x, gap, steps)
-    pressed.computed["edges"] = row_edges
-    return row_edges
+        contact_edges = edges.snap_to_steps(contact_edges, x, pressed.unloaded_gap, steps)
+    pressed.computed["edges"] = contact_edges
+    return contact_edges
 
 
-def _compute_stiffnesses(pressed: PressedCases, row_edges: edges.ContactEdges) -> np.ndarray:
-    """Return normal [N/m], rotational [N m/rad] and tangential stiffness [N/m] of all strips (3, n s).
+def _compute_stiffnesses(pressed: PressedCases, contact_edges: edges.ContactEdges) -> np.ndarray:
+    """Return normal [N/m], rotational [N m/rad] and tangential stiffness [N/m] of n cases, (3, n).
 
     The stiffness of the nodes in contact is that of edges half a cell beyond the last nodes. Every edge that lies elsewhere
     adds the change along the parabola through the sets with one node less and one more.
@@ -275,19 +263,19 @@ def _compute_stiffnesses(pressed: PressedCases, row_edges: edges.ContactEdges) -
     Parameters
     ----------
     pressed : PressedCases
-        n cases in s strips.
-    row_edges : ContactEdges
+        n cases.
+    contact_edges : ContactEdges
         Their edges.
     """
     level = pressed.level
-    active = pressed.flatten(pressed.is_loaded)
-    n_edges = row_edges.node.shape[1]
+    active = pressed.active
+    n_edges = contact_edges.node.shape[1]
     work = np.zeros((3, len(active)))
     changes = np.zeros((2, 3, len(active), n_edges))
 
     # The compliance of a smooth layer is that of the linearised law at the pressure of each case
     if level.is_smooth:
-        for row, layer in enumerate(pressed.flatten(pressed.layer)):
+        for row, layer in enumerate(pressed.layer):
             if not active[row].any():
                 continue
             normal, shear = level.add_layer(layer)
@@ -310,7 +298,7 @@ def _compute_stiffnesses(pressed: PressedCases, row_edges: edges.ContactEdges) -
             work[number] = one.work[own, column, column]
             changes[:, number] = one.end_changes(own, column, n_edges)
 
-    shift = np.where(row_edges.exists, row_edges.fraction - 0.5, 0.0)
+    shift = np.where(contact_edges.exists, contact_edges.fraction - 0.5, 0.0)
     return work + edges.parabola_change(shift, *changes).sum(axis=-1)
 
 
@@ -359,7 +347,7 @@ def unresolved_edge_rounding_pressure(pressed: PressedCases) -> np.ndarray:
             # The contact does not end at the rounded end.
             if abs(abs(x[node]) - half_flat_length) > 2 * cell:
                 continue
-            pressure = pressed.mean_pressure[row, max(node - 2, 0) : node + 3].max()
+            pressure = pressed.contact_pressure[row, max(node - 2, 0) : node + 3].max()
             peak_width, peak = closed_forms.contact.rounded_corner_contact(
                 pressure * np.sqrt(cell), radius, modulus
             )
