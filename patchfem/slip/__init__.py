@@ -14,10 +14,7 @@ first.
 PUBLIC = {
     "edge_springs": ("add_edge_springs",),
     "fields": ("compute_element_fields",),
-    "mesh_correction": (
-        "ERROR_TO_SPREAD_CHANGE",
-        "spread_elements",
-    ),
+    "mesh_correction": ("spread_elements",),
     "shear_modes": (
         "JenkinsSet",
         "N_SHEAR_MODES",

@@ -11,9 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Ratio of the error of a measure to its change when each element is spread over a range of yield
-# displacements (measured in tests/README.md)
-ERROR_TO_SPREAD_CHANGE = 1.5
 N_ELEMENT_PARTS = 4  # number of parts into which each element but the first is divided
 # Number of times that the range of the first element is halved, with N_ELEMENT_PARTS parts per
 # halving; displacements down to 1/256 of this range then cause slip

@@ -65,7 +65,8 @@ def compute_balance_curve(joint: JointMode, amplitudes) -> Curve:
     sustained, errors = tabulate_motions(motions, has_errors=joint.has_errors)
     values = sustained[:3]
     error = errors[:3] + joint.spatial_discretization_errors(
-        lambda mode, laws: tabulate_free_motions(laws, mode, amplitudes)
+        lambda mode, laws: tabulate_free_motions(laws, mode, amplitudes),
+        amplitudes,
     )
     known = np.isfinite(values + error).all(axis=0)
     if not known.any():

@@ -227,14 +227,16 @@ class JointMode(NamedTuple):
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
     def spatial_discretization_errors(
-        self, compute: Callable[["JointMode", UndrivenRig], np.ndarray]
+        self, compute: Callable[["JointMode", UndrivenRig], np.ndarray], amplitudes
     ) -> np.ndarray | float:
         """Return the error estimates of a quantity for the mesh of patches in partial slip.
 
         Parameters
         ----------
         compute : callable
-            Function of a JointMode and an UndrivenRig that returns the quantity as an array.
+            Function of a JointMode and an UndrivenRig that returns quantities (r, k).
+        amplitudes : (k,)
+            Amplitudes of the quantities [m].
 
         Returns
         -------
@@ -247,6 +249,7 @@ class JointMode(NamedTuple):
             self.steady_laws(),
             decays.make_laws_on_coarse_meshes(self.model, self.coarse, self.stiffer),
             lambda laws: compute(self.with_modes(laws.modes, laws.stiffness), laws),
+            amplitudes,
         )
 
     def with_modes(self, modes, stiffness: np.ndarray) -> "JointMode":

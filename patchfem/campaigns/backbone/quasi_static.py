@@ -56,7 +56,8 @@ def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
     rough = decays.compute_static_curve(laws, joint.mode, amplitudes, ROUGH_RTOL)
     error = np.abs(best - rough) + ROUND_OFF_ERROR * np.abs(best)
     error += joint.spatial_discretization_errors(
-        lambda _, group: decays.compute_static_curve(group, joint.mode, amplitudes)
+        lambda _, group: decays.compute_static_curve(group, joint.mode, amplitudes),
+        amplitudes,
     )
     return _select_rising_part(best, error)
 

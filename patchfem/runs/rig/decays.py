@@ -25,7 +25,7 @@ from ...response.decay_curve import (
     locate_reversals,
     make_half_cycles,
 )
-from ...slip.mesh_correction import ERROR_TO_SPREAD_CHANGE, spread_elements
+from ...slip.mesh_correction import spread_elements
 from ..patch import faces
 from . import joints, numerics
 from .solution import Solution
@@ -42,6 +42,11 @@ NO_STATIC_CURVE_REASON = "no static curve of the mode was found at these amplitu
 MAX_DECAY_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curve is accepted.
 # Number of amplitudes per decade at which the mesh error is computed.
 MESH_AMPLITUDES_PER_DECADE = 16
+# Largest ratio of two amplitudes whose changes by the mesh are pooled; it spans about a node's slip and the next one's
+MAX_POOLED_RATIO = 1.6
+# Half the width of a 95 % interval in standard deviations, which the root mean square of the changes estimates; it
+# contained 98 % of the errors of damping and frequency on 98 random meshes, compared with 1281 nodes
+ERROR_TO_CHANGE = 2.0
 
 
 def compute_decay_curve(solution: Solution) -> DecayCurve | None:
@@ -179,12 +184,13 @@ def tabulate_static_motions(modes, motions) -> np.ndarray:
     return np.array([amplitude, frequency, damping, loss, force])
 
 
-def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
+def estimate_mesh_error(fine, coarse, compute, amplitudes) -> np.ndarray:
     """Estimate the mesh error of quantities that depend on the friction laws of patches.
 
-    The change on a coarser mesh is extrapolated at second order. At a displacement at which no node
-    slips, a coarser mesh changes nothing. Therefore the error is at least the change when the
-    elements are spread over the yield displacements between the nodes (`slip.mesh_correction`).
+    The change on a coarser mesh is extrapolated at second order. At a displacement at which no node slips, a coarser mesh
+    changes nothing. Therefore the change counts as at least that when the elements are spread over the yield displacements
+    between the nodes (`slip.mesh_correction`). Both changes pass through zero from node to node, so that the error follows
+    from their root mean square at the amplitudes nearby.
 
     Parameters
     ----------
@@ -193,15 +199,26 @@ def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
     coarse : list of UndrivenRig
         Laws with a coarser mesh of one patch each.
     compute : callable
-        Function that computes the quantities from an UndrivenRig, as an array.
+        Function that computes the quantities (r, k) at the amplitudes from an UndrivenRig.
+    amplitudes : (k,)
+        Amplitudes [m].
+
+    Returns
+    -------
+    (r, k) array
+        Errors of the quantities, in their units.
     """
     best = compute(fine)
     changes = (compute(other) - best for other in coarse)
     by_meshes = sum(convergence_error(change, order=MAX_CONVERGENCE_ORDER) for change in changes)
-    return np.fmax(
-        ERROR_TO_SPREAD_CHANGE * np.abs(compute(fine.with_elements(_spread_elements)) - best),
-        by_meshes,
-    )
+    change = np.fmax(np.abs(compute(fine.with_elements(_spread_elements)) - best), by_meshes)
+
+    # Root mean square over the known changes within a ratio of amplitudes
+    distance = np.abs(np.subtract.outer(np.log(amplitudes), np.log(amplitudes)))
+    is_near = np.where(distance <= np.log(MAX_POOLED_RATIO), 1.0, 0.0)
+    known = np.isfinite(change)
+    squares = np.where(known, change, 0.0) ** 2 @ is_near / np.maximum(known @ is_near, 1)
+    return np.where(known, ERROR_TO_CHANGE * np.sqrt(squares), np.nan)
 
 
 def _spread_elements(stiffness, yield_displacement) -> tuple[np.ndarray, np.ndarray]:
@@ -261,6 +278,7 @@ def estimate_decay_mesh_errors(
             fine,
             make_laws_on_coarse_meshes(model, coarse, stiffer),
             lambda laws: compute_static_curve(laws, mode_index, amplitudes)[1:3],
+            amplitudes,
         )
     except NotConverged as reason:
         return unknown._replace(reason=str(reason))
