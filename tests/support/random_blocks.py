@@ -45,10 +45,11 @@ def draw_contact(seed: int) -> dict:
     # The gap at the sides is about the displacement of the flat pieces, from a fifth of it to twenty times
     closing = load / (length * width) * height / 1e11
     shapes = set(rng.choice(SHAPES, rng.integers(1, 4), replace=False).tolist())
-    # A load line leaves the rotation free that a tilt or a roll would prescribe
-    shapes -= {"tilt"} if "offset" in shapes else set()
+    # A load line leaves a rotation free that a tilt or a roll would prescribe
+    shapes -= {"tilt", "roll"} if "offset" in shapes else set()
     shapes -= {"roll"} if "side" in shapes else set()
-    # A crown along y needs one along x
+    # A roll needs a tilt, and a crown along y one along x
+    shapes |= {"tilt"} if "roll" in shapes else set()
     shapes |= {"crown"} if "across" in shapes else set()
     for shape in sorted(shapes):
         rise = closing * 10 ** rng.uniform(-0.7, 1.3)
