@@ -20,7 +20,11 @@ MAX_PLAUSIBLE_CHANGE_RATIO = 16.0
 
 
 def convergence_error(
-    change, *coarser_changes, ratio: float = 2.0, order: float = MIN_CONVERGENCE_ORDER
+    change,
+    *coarser_changes,
+    ratio: float = 2.0,
+    order: float = MIN_CONVERGENCE_ORDER,
+    max_order: float = MAX_CONVERGENCE_ORDER,
 ):
     """Estimate the error of a value from its changes between successive runs.
 
@@ -28,11 +32,11 @@ def convergence_error(
     errors of a run and of the next coarser one.
 
     - Two runs (one change): growth = ratio**order.
-    - Three runs: growth is the ratio of the two changes, at most 2**MAX_CONVERGENCE_ORDER, if it lies between
-      ratio**order and MAX_PLAUSIBLE_CHANGE_RATIO. The change counts as at least 2**-MAX_CONVERGENCE_ORDER of the previous
+    - Three runs: growth is the ratio of the two changes, at most 2**max_order, if it lies between
+      ratio**order and MAX_PLAUSIBLE_CHANGE_RATIO. The change counts as at least 2**-max_order of the previous
       one, so that a change that is small by accident does not give a small error.
     - More runs: the estimate without the finest run is an upper limit if its interval contains the
-      value; the error is assumed to decrease by at most 2**MAX_CONVERGENCE_ORDER from run to run.
+      value; the error is assumed to decrease by at most 2**max_order from run to run.
 
     Parameters
     ----------
@@ -46,6 +50,8 @@ def convergence_error(
         a finer run.
     order : float
         Order of convergence that is assumed if the changes do not show it.
+    max_order : float
+        Highest order of convergence that the changes can show.
 
     Returns
     -------
@@ -59,12 +65,14 @@ def convergence_error(
         with np.errstate(divide="ignore", invalid="ignore"):
             observed = np.divide(previous, change)
         shows_order = (observed > growth) & (observed <= MAX_PLAUSIBLE_CHANGE_RATIO)
-        growth = np.where(shows_order, np.minimum(observed, 2.0**MAX_CONVERGENCE_ORDER), growth)
-        largest = np.fmax(largest, np.abs(previous) / 2.0**MAX_CONVERGENCE_ORDER)
+        growth = np.where(shows_order, np.minimum(observed, 2.0**max_order), growth)
+        largest = np.fmax(largest, np.abs(previous) / 2.0**max_order)
     error = (ERROR_SAFETY_FACTOR * largest / np.abs(growth - 1))[()]
     if len(coarser_changes) > 1:
-        coarser_error = convergence_error(*coarser_changes, ratio=ratio, order=order)
+        coarser_error = convergence_error(
+            *coarser_changes, ratio=ratio, order=order, max_order=max_order
+        )
         if abs(change) <= coarser_error:  # the value lies in the error interval of the coarser run
             error = min(error, coarser_error)
-        error = max(error, coarser_error / 2**MAX_CONVERGENCE_ORDER)
+        error = max(error, coarser_error / 2**max_order)
     return error

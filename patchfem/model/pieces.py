@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from .. import closed_forms
+from .. import closed_forms, elasticity
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh import files
@@ -39,6 +39,19 @@ def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
     return Layers(
         (coating.young, coating.poisson), (substrate.young, substrate.poisson), patch.pieces.plane
     )
+
+
+def make_layer_stacks(
+    patch: PatchModel,
+) -> "tuple[elasticity.sides.LayerStack, elasticity.sides.LayerStack]":
+    """Return the layers of the upper and of the lower piece of a patch, from the face to the far face."""
+    upper, lower = (
+        elasticity.sides.make_stack(
+            piece.height, piece.thickness, make_elastic_layers(patch, piece)
+        )
+        for piece in (patch.pieces.upper, patch.pieces.lower)
+    )
+    return upper, lower
 
 
 def _make_flat_grid(patch: PatchModel, piece: PatchPiece):

@@ -1,7 +1,8 @@
 """Pressed face: pressure that varies along x and y, on cells that are halved until the tolerance is met.
 
 In: a `PatchModel` with an area. Out: `AreaPatch`es from fine to coarse, with the names of a `Patch`, whose points are the
-cells. The errors of the static measures follow from two axes of resolution: the cells, and the bricks of the free sides.
+cells. A coarser grid also has coarser bricks of the free sides, so that every error that follows from the changes over the
+grids, of a static measure as of a motion, contains both.
 """
 
 from dataclasses import dataclass, field, replace
@@ -17,29 +18,37 @@ from ...contact import press_cells as faces
 from ...contact.cells import BlockCompliance, CellCompliance, make_block
 from ...convergence import convergence_error
 from ...core import ContactState, Interface, Outcome, frozen_array
-from ...elasticity.sides import BlockShape, make_stack
+from ...elasticity.sides import BlockShape
 from ...model.face import compute_face_gap
 from ...model.patch import PatchModel
-from ...model.pieces import make_elastic_layers
+from ...model.pieces import make_layer_stacks
 from ..results.patch_rows import CELLS_SOURCE, Arrays, Measures, Values, make_measure
 from . import store
 from .measures import (
     MIN_PLANE_STRAIN_WIDTH_RATIO,
     PRESSURE_PEAK_MEASURES,
+    list_larger_terms,
     max_mesh_error_ratio,
 )
 from .press import Surface
+from .values import EdgeValues, assemble_static_values
 
 FIRST_CELLS = 64  # cells along the longer side of the coarsest grid
 MIN_CELLS_ACROSS = (
     8  # smallest number of cells along the shorter side, which resolves the free sides
 )
 MIN_GRIDS = 3  # grids after which the order of convergence shows
-SIDE_LEVEL = 1  # level of the bricks of the free sides; the level before gives their error
+SIDE_LEVEL = 1  # level of the bricks of the free sides of the finest grid
+COARSE_SIDE_LEVEL = 0  # level of the bricks of the free sides of coarser grids
+# Order of convergence of a face: an edge of contact follows the sides of cells, so that its position has an error of a part
+# of a cell that varies irregularly from grid to grid. A higher order shows by chance.
+FACE_ORDER = 1.0
 # A boundary of cells counts this part of each of its sides too much (Yastrebov, Anciaux and Molinari, Tribology Letters
 # 65, 2017).
 BOUNDARY_SIDE_FRACTION = (np.pi - 1 + np.log(2)) / 24
-MIN_RELATIVE_ERROR = 1e-7  # smallest relative error that is stated; the contact is solved to 1e-8
+# Smallest error that is stated, relative to a value and to the larger terms whose difference it is; the contact is solved to
+# 1e-8 of the displacement
+MIN_RELATIVE_ERROR = 1e-7
 FREE_EDGE_REASON = "the largest pressure is at a free side of the face, where it converges too slowly over equal cells"
 NO_HALF_WIDTH_REASON = "a contact over a face has no half-width; contact_area is its area"
 
@@ -147,7 +156,7 @@ class AreaPatch:
     Arrays (m,) belong to the m = ny nx cells, row by row along y. Forces, areas and stiffnesses are sums over all pairs.
 
     - model: PatchModel.
-    - cells: compliance of the cells (normal and shear), with the layer of asperities.
+    - cells: compliance of the pieces at the cells (normal and shear), without the layer of asperities.
     - pressed: pressure and gap over the cells.
     - unloaded_gap (m,): gap of the unloaded faces [m].
     - slip_compliance: shear compliance with which cells slip one by one.
@@ -292,12 +301,9 @@ def make_cells(
     pieces = patch_model.pieces
     counts = _divide_sides(patch_model, n_cells)
     shape = BlockShape(pieces.length, pieces.width, free_sides)
-    stacks = []
-    for piece in (pieces.upper, pieces.lower):
-        layers = make_elastic_layers(patch_model, piece)
-        stacks.append(make_stack(piece.height, piece.thickness, layers))
-    key = ("cells", shape, tuple(stacks), counts, side_level)
-    return store.get_or_compute(key, lambda: make_block(shape, tuple(stacks), counts, side_level))
+    stacks = make_layer_stacks(patch_model)
+    key = ("cells", shape, stacks, counts, side_level)
+    return store.get_or_compute(key, lambda: make_block(shape, stacks, counts, side_level))
 
 
 def _divide_sides(patch_model: PatchModel, n_cells: int) -> tuple[int, int]:
@@ -366,37 +372,48 @@ def press_gap(
         If the contact is not found.
     """
     begin = process_time()
-    shape = cells.normal.shape
-    pairs = patch_model.pieces.pairs
-    weight = cells.normal.cell_area * pairs
-
-    # A layer of asperities is in series with the pieces; without a tangential ratio it is rigid in shear.
-    skin = patch_model.interface.skin
-    normal = cells.normal
-    shear = cells.shear
-    layer_shear = 0.0
-    if skin is not None:
-        normal = soften(normal, 1 / skin.normal_stiffness)
-        if skin.tangential_ratio is not None:
-            layer_shear = 1 / (skin.normal_stiffness * skin.tangential_ratio)
-            shear = soften(shear, layer_shear)
-    soft = soften(normal, softening * weight)
+    weight = cells.normal.cell_area * patch_model.pieces.pairs
+    soft = soften(_add_asperities(patch_model, cells).normal, softening * weight)
     pressed = faces.press_cells(soft, unloaded, make_loading(patch_model), start)
-
-    # Pieces that do not shear leave the layer and the holder as the only compliance of slip.
-    slip_cells = shear
-    if not patch_model.interface.has_shear:
-        rigid = replace(cells.shear, waves=np.zeros(shape), sides=None)
-        slip_cells = SoftenedCells(rigid, layer_shear) if layer_shear else None
-    spring = patch_model.loading.tangential_stiffness
-    slip_compliance = FaceCompliance(slip_cells, 1 / spring if spring else 0.0, weight)
     return AreaPatch(
         patch_model,
-        BlockCompliance(normal, shear),
+        cells,
         pressed,
         frozen_array(unloaded.ravel()),
-        slip_compliance,
+        _make_slip_compliance(patch_model, cells),
         ((), {"press": process_time() - begin}),
+    )
+
+
+def _add_asperities(patch_model: PatchModel, cells: BlockCompliance) -> BlockCompliance:
+    """Return the compliance of cells in series with the layer of asperities of a patch.
+
+    Without a tangential ratio the layer is rigid in shear.
+    """
+    skin = patch_model.interface.skin
+    if skin is None:
+        return cells
+    normal = soften(cells.normal, 1 / skin.normal_stiffness)
+    if skin.tangential_ratio is None:
+        return BlockCompliance(normal, cells.shear)
+    layer_shear = 1 / (skin.normal_stiffness * skin.tangential_ratio)
+    return BlockCompliance(normal, soften(cells.shear, layer_shear))
+
+
+def _make_slip_compliance(patch_model: PatchModel, cells: BlockCompliance) -> FaceCompliance:
+    """Make the shear compliance with which the cells of a patch slip one by one."""
+    pieces = cells
+    if not patch_model.interface.has_shear:
+        # Pieces that do not shear leave the layer and the holder as the only compliance
+        rigid = replace(cells.shear, waves=np.zeros(cells.shear.shape), sides=None)
+        pieces = BlockCompliance(cells.normal, rigid)
+    shear = _add_asperities(patch_model, pieces).shear
+    is_rigid = shear is pieces.shear and not patch_model.interface.has_shear
+    spring = patch_model.loading.tangential_stiffness
+    return FaceCompliance(
+        cells=None if is_rigid else shear,
+        holder=1 / spring if spring else 0.0,
+        weight=cells.normal.cell_area * patch_model.pieces.pairs,
     )
 
 
@@ -430,46 +447,49 @@ def make_loading(patch_model: PatchModel) -> faces.FaceLoading:
 def compute_face_values(patch: AreaPatch) -> Values:
     """Return the values of all static measures of a pressed face by name, in SI units.
 
-    The fraction in contact is corrected for the sides of the cells at its boundary (`BOUNDARY_SIDE_FRACTION`).
+    `patch_rows` defines the measures. The fraction in contact is corrected for the sides of the cells at its boundary
+    (`BOUNDARY_SIDE_FRACTION`); a contact over a face has no half-width, so that it is nan.
     """
     pieces = patch.model.pieces
     pressure = patch.pressed.pressure
     state = patch.pressure
     active = pressure > 0
     area = pieces.length * pieces.width * pieces.pairs
-    load = state.load
-    roll_moment = float(patch.normal_stress * patch.slip_compliance.weight @ patch.y)
     n_sides = sum(np.count_nonzero(np.diff(active, axis=axis)) for axis in (0, 1))
-    fraction = float(active.sum() - BOUNDARY_SIDE_FRACTION * n_sides) / active.size
-    peak = estimate_peak(pressure)
-    values = {
-        "normal_load": load,
-        "contact_fraction": fraction,
+    fraction = (active.sum() - BOUNDARY_SIDE_FRACTION * n_sides) / active.size
+
+    def compute_stiffness(cells, motion=1.0) -> float:
+        """Return the stiffness of the set in contact against a motion of its cells, of all pairs."""
+        if not state.load > 0:
+            return 0.0
+        return faces.compute_set_stiffness(cells, active, motion) * pieces.pairs
+
+    # What a face has in common with a patch whose pressure varies along x alone
+    normal, shear = _add_asperities(patch.model, patch.cells)
+    edge_values = EdgeValues(
+        length=fraction * pieces.length,
+        width=np.nan,
+        normal=compute_stiffness(normal),
+        tangential=compute_stiffness(shear),
+        rotational=compute_stiffness(normal, np.broadcast_to(normal.x, pressure.shape)),
+    )
+    values = assemble_static_values(
+        pieces.length, area, state, estimate_peak(pressure), edge_values
+    )
+
+    # What only a face has
+    roll_moment = patch.normal_stress * patch.slip_compliance.weight @ patch.y
+    values |= {
         "contact_area": fraction * area,
-        "pressure_peak": peak,
-        "moment": state.moment,
-        "rotation": state.rotation,
-        "approach": state.approach,
-        "pressure_centre": state.moment / load if load > 0 else 0.0,
-        "pressure_centre_y": roll_moment / load if load > 0 else 0.0,
+        "pressure_centre_y": roll_moment / state.load if state.load > 0 else 0.0,
         "roll": patch.model.gap.roll + patch.pressed.tilt_y,
         "roll_moment": roll_moment,
-        "loaded_fraction": load / (area * peak) if load > 0 else 0.0,
+        "roll_stiffness": compute_stiffness(
+            normal, np.broadcast_to(normal.y[:, None], pressure.shape)
+        ),
     }
     if patch.model.area.hardness is not None:
-        values["yielded_fraction"] = float((pressure >= patch.model.area.hardness).mean())
-
-    # Stiffness of the set in contact under an approach, a slide and two rotations, of all pairs.
-    normal, shear = patch.cells
-    motions = {
-        "normal_stiffness": (normal, 1.0),
-        "tangential_stiffness": (shear, 1.0),
-        "rotational_stiffness": (normal, np.broadcast_to(normal.x, pressure.shape)),
-        "roll_stiffness": (normal, np.broadcast_to(normal.y[:, None], pressure.shape)),
-    }
-    for name, (cells, motion) in motions.items():
-        stiffness = faces.compute_set_stiffness(cells, active, motion) if load > 0 else 0.0
-        values[name] = stiffness * pieces.pairs
+        values["yielded_fraction"] = (pressure >= patch.model.area.hardness).mean()
     return {name: float(value) for name, value in values.items()}
 
 
@@ -501,8 +521,7 @@ def with_face_measures(
 ) -> "tuple[AreaPatch | None, ...]":
     """Return a face on successive grids, of which the finest one has its static measures with their errors.
 
-    The error is that of the cells, from the changes over the grids, plus that of the free sides, from the change on the
-    second grid when their bricks are refined. Without a second grid the errors are None.
+    The errors follow from the changes over the grids, whose order is `FACE_ORDER`. Without a second grid they are None.
 
     Parameters
     ----------
@@ -510,56 +529,35 @@ def with_face_measures(
         From fine to coarse.
     tolerance : float
         Relative error, which raises the floors of differences of larger terms.
+
+    Returns
+    -------
+    tuple
+        The patches; the first one is a copy with the measures.
     """
-    patch, *others = patches
-    coarser = [other for other in others if other is not None]
-    series = [compute_face_values(one) for one in (patch, *coarser)]
-    sides = {}
-    if coarser:
-        # The bricks change the compliance smoothly, so that the second grid shows their error.
-        grid = coarser[0]
-        model = grid.model
-        cells = make_cells(model, max(grid.shape), SIDE_LEVEL - 1)
-        gap = grid.unloaded_gap.reshape(grid.shape)
-        other_sides = compute_face_values(press_gap(model, cells, gap, 0.0, grid.pressed.pressure))
-        sides = {name: value - other_sides[name] for name, value in series[1].items()}
-    measures = {}
+    patch, *coarser = patches
+    pieces = patch.model.pieces
+    series = [compute_face_values(one) for one in patches if one is not None]
     values = series[0]
+    larger_terms = list_larger_terms(values, pieces.length / 2, pieces.width / 2)
+    measures = {}
     for name, value in values.items():
         error = None
-        if sides:
+        larger_term = larger_terms.get(name, 0.0)
+        if len(series) > 1:
             changes = -np.diff([row[name] for row in series])
-            error = float(convergence_error(*changes)) + float(convergence_error(sides[name]))
-            error = max(error, MIN_RELATIVE_ERROR * abs(value))
-        measures[name] = make_measure(name, value, error, CELLS_SOURCE)
-    half_width = make_measure("contact_half_width", 0.0, None, CELLS_SOURCE)
-    measures["contact_half_width"] = replace(half_width, value=None, reason=NO_HALF_WIDTH_REASON)
-    has_side_peak = is_peak_at_side(patch.pressed.pressure) and not values.get("yielded_fraction")
-    for name in PRESSURE_PEAK_MEASURES if has_side_peak else ():
-        measures[name] = replace(measures[name], value=None, error=None, reason=FREE_EDGE_REASON)
-    return replace(patch, measures=_raise_floors(measures, patch.model, tolerance)), *others
+            error = convergence_error(*changes, max_order=FACE_ORDER)
+            error = max(error, MIN_RELATIVE_ERROR * max(abs(value), larger_term))
+        measure = make_measure(name, value, error, CELLS_SOURCE)
+        measures[name] = replace(measure, floor=max(measure.floor, tolerance * larger_term))
 
-
-def _raise_floors(measures: Measures, patch_model: PatchModel, tolerance: float) -> Measures:
-    """Return measures whose floors cover differences of larger terms, as those of a plane patch do.
-
-    These are the tolerance times half the length or half the width for the pressure centre, times the load for the
-    moments, and times the rotations for the approach.
-    """
-    out = dict(measures)
-    load = measures["normal_load"].value
-    along = patch_model.pieces.length / 2
-    across = patch_model.pieces.width / 2
-    terms = {
-        "pressure_centre": along,
-        "pressure_centre_y": across,
-        "moment": load * along,
-        "roll_moment": load * across,
-        "approach": abs(measures["rotation"].value) * along + abs(measures["roll"].value) * across,
-    }
-    for name, size in terms.items():
-        out[name] = replace(out[name], floor=max(out[name].floor, tolerance * size))
-    return out
+    # Measures without a value, for a reason
+    reasons = {"contact_half_width": NO_HALF_WIDTH_REASON}
+    if is_peak_at_side(patch.pressed.pressure) and not values.get("yielded_fraction"):
+        reasons |= dict.fromkeys(PRESSURE_PEAK_MEASURES, FREE_EDGE_REASON)
+    for name, reason in reasons.items():
+        measures[name] = replace(measures[name], value=None, error=None, reason=reason)
+    return replace(patch, measures=measures), *coarser
 
 
 def list_cell_counts(patch_model: PatchModel) -> tuple[int, ...]:
@@ -598,21 +596,26 @@ def solve_face_on_grids(
         Patches from fine to coarse, at least two; None for a grid that is not solved. The first one has the measures.
     """
     counts = list_cell_counts(patch_model)
-    if not with_errors:
-        patch = press_face(patch_model, make_cells(patch_model, counts[2], SIDE_LEVEL))
-        return with_face_measures((patch, None), tolerance)
 
-    patches = ()
-    for count in counts:
-        cells = make_cells(patch_model, count, SIDE_LEVEL)
-        start = _double_cells(patches[0].pressed.pressure, cells) if patches else None
-        patches = (press_face(patch_model, cells, start=start), *patches)
-        if len(patches) < MIN_GRIDS:
-            continue
-        patches = with_face_measures(patches, tolerance)
+    def press(count: int, side_level: int, other: AreaPatch | None = None) -> AreaPatch:
+        """Press the face on a number of cells, from the pressure on another grid."""
+        cells = make_cells(patch_model, count, side_level)
+        start = None if other is None else _find_start(other.pressed.pressure, cells)
+        return press_face(patch_model, cells, start=start)
+
+    if not with_errors:
+        return with_face_measures((press(counts[2], SIDE_LEVEL), None), tolerance)
+
+    coarser = ()
+    for count in counts[: MIN_GRIDS - 1]:
+        coarser = (press(count, COARSE_SIDE_LEVEL, *coarser[:1]), *coarser)
+    for count in counts[MIN_GRIDS - 1 :]:
+        patch = press(count, SIDE_LEVEL, coarser[0])
+        patches = with_face_measures((patch, *coarser), tolerance)
         is_met = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
-        if is_met or patches[0].pressure.outcome is Outcome.NO_CONTACT:
+        if is_met or count == counts[-1] or patch.pressure.outcome is Outcome.NO_CONTACT:
             break
+        coarser = (press(count, COARSE_SIDE_LEVEL, patch), *coarser)
     return patches
 
 
@@ -643,8 +646,7 @@ def describe_plane_strain(patch_model: PatchModel | None) -> list[str]:
 
 def press_worn(patch: AreaPatch, worn: np.ndarray) -> AreaPatch:
     """Return the face of a patch on its cells with a worn depth (m,) [m] added to its unworn gap."""
-    cells = make_cells(patch.model, max(patch.shape), SIDE_LEVEL)
-    return press_face(patch.model, cells, worn, patch.pressed.pressure)
+    return press_face(patch.model, patch.cells, worn, patch.pressed.pressure)
 
 
 def make_force_function(patch: AreaPatch):
@@ -654,7 +656,7 @@ def make_force_function(patch: AreaPatch):
     forces (m,) [N]. Each contact starts from the one before.
     """
     model = patch.model
-    cells = make_cells(model, max(patch.shape), SIDE_LEVEL)
+    cells = patch.cells
     unworn = compute_face_gap(model, cells.normal.x, cells.normal.y).heights
     latest = [patch.pressed.pressure]
 
@@ -710,7 +712,8 @@ def find_nearest_contact(patch: AreaPatch) -> np.ndarray:
     return np.ravel_multi_index(tuple(nearest), active.shape).ravel()
 
 
-def _double_cells(pressure: np.ndarray, cells: BlockCompliance) -> np.ndarray | None:
-    """Return a pressure on cells half as long, from which the solver starts; None if the grid is not doubled."""
-    doubled = np.repeat(np.repeat(pressure, 2, axis=0), 2, axis=1)
-    return doubled if doubled.shape == cells.normal.shape else None
+def _find_start(pressure: np.ndarray, cells: BlockCompliance) -> np.ndarray | None:
+    """Return a pressure on the same cells, or on cells half as long, from which the solver starts; None on others."""
+    factor = cells.normal.shape[0] // len(pressure)
+    fine = np.repeat(np.repeat(pressure, factor, axis=0), factor, axis=1)
+    return fine if fine.shape == cells.normal.shape else None

@@ -124,9 +124,8 @@ class StaticEstimates(NamedTuple):
     def floors(self, tolerance: float, length: float) -> np.ndarray:
         """Return the absolute errors (k, n) that are allowed at any tolerance.
 
-        The floor of a measure that is a difference of larger terms is at least the tolerance times these terms: rotation
-        times half the length for the approach, half the length for the centre of pressure, and load times half the length
-        for the moment.
+        The floor of a measure that is a difference of larger terms is at least the tolerance times these terms
+        (`list_larger_terms`).
 
         Parameters
         ----------
@@ -136,15 +135,10 @@ class StaticEstimates(NamedTuple):
             Length [m] of the interface.
         """
         floors = np.zeros(self.values.shape) + [[PATCH_TABLE[name].floor] for name in self.names]
-        arm = tolerance * length / 2
-        row = self.names.index
-        larger_terms = {
-            "approach": np.abs(self.values[row("rotation")]) * arm,
-            "pressure_centre": arm,
-            "moment": self.values[row("normal_load")] * arm,
-        }
-        for name, size in larger_terms.items():
-            floors[row(name)] = np.maximum(floors[row(name)], size)
+        values = dict(zip(self.names, self.values))
+        for name, size in list_larger_terms(values, tolerance * length / 2).items():
+            row = self.names.index(name)
+            floors[row] = np.maximum(floors[row], size)
         return floors
 
     def excess(self, tolerance: float, length: float) -> np.ndarray:
@@ -158,6 +152,38 @@ class StaticEstimates(NamedTuple):
         ]
         ratios = self.errors[rows] / np.maximum(allowed, 1e-300)
         return np.nan_to_num(ratios).max(axis=0)
+
+
+def list_larger_terms(
+    values: "Arrays | Values", arm: float, arm_y: float | None = None
+) -> "Arrays | Values":
+    """Return the sizes of the larger terms whose differences some measures are, by name, in the units of the measures.
+
+    Parameters
+    ----------
+    values : dict
+        Static measures by name, numbers or arrays (n,).
+    arm : float
+        Half the length of the interface [m], or a fraction of it for a fraction of the terms.
+    arm_y : float, optional
+        Half the width [m] of a face whose pressure varies along y, or the same fraction of it.
+
+    Returns
+    -------
+    dict
+        The arms for the centres of pressure, the load times them for the moments, and the rotations times them for the
+        approach; numbers or arrays (n,).
+    """
+    load = values["normal_load"]
+    terms = {
+        "approach": np.abs(values["rotation"]) * arm,
+        "pressure_centre": arm,
+        "moment": load * arm,
+    }
+    if arm_y is not None:
+        terms["approach"] = terms["approach"] + np.abs(values["roll"]) * arm_y
+        terms |= {"pressure_centre_y": arm_y, "roll_moment": load * arm_y}
+    return terms
 
 
 def estimate_static_measures(

@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import row_edges
-from ...contact.cells import BlockCompliance, make_block
+from ...contact.cells import make_block
 from ...contact.edges import contact_intervals
 from ...contact.press_cells import FaceLoading, press_cells, solve_on_set
 from ...core import NotConverged
 from ...elasticity.lapack import use_one_blas_thread
-from ...elasticity.sides import BlockShape, make_stack
+from ...elasticity.sides import BlockShape
 from ...model import profile
-from ...model.pieces import make_elastic_layers
+from ...model.pieces import make_layer_stacks
 from ..results.patch_rows import HALF_SPACE_SOURCE, Measures, Values, make_measure
 from .measures import (
     MIN_CONTACT_EDGE_ERROR_IN_CELLS,
@@ -183,27 +183,6 @@ def _combine_refinement_series(
     return out
 
 
-def make_point_compliances(patch_model, side_level: int, count: int) -> BlockCompliance:
-    """Return the normal and the tangential compliance of equally spaced points.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch whose pieces and coatings the points are on.
-    side_level : int
-        Refinement of the bricks of the free ends.
-    count : int
-        Number of points.
-    """
-    pieces = patch_model.pieces
-    stacks = tuple(
-        make_stack(piece.height, piece.thickness, make_elastic_layers(patch_model, piece))
-        for piece in (pieces.upper, pieces.lower)
-    )
-    shape = BlockShape(pieces.length, pieces.width * pieces.pairs, "x")
-    return make_block(shape, stacks, (count, 1), side_level)
-
-
 def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointLevel:
     """Solve the contact problem of a patch on equally spaced points.
 
@@ -218,8 +197,10 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     start : (count/2,) array, optional
         Pressure [Pa] on the level with half as many points, from which the solution starts.
     """
-    length = patch_model.pieces.length
-    normal, shear = make_point_compliances(patch_model, side_level, count)
+    pieces = patch_model.pieces
+    length = pieces.length
+    shape = BlockShape(length, pieces.width * pieces.pairs, "x")
+    normal, shear = make_block(shape, make_layer_stacks(patch_model), (count, 1), side_level)
     x = normal.x
     half_points = np.linspace(-length / 2, length / 2, 2 * count + 1)
     gap = patch_model.gap.evaluate(half_points).heights[1::2]
@@ -250,7 +231,7 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     contact_edges = row_edges.find_row_edges(normal, pressure, opening, pressure_rate)
     # A loaded point at an end of the interface is in contact as far as this end.
     intervals = contact_intervals(half_points[[0, -1]], pressure[[0, -1]], contact_edges)
-    are_alike = patch_model.pieces.are_alike
+    are_alike = pieces.are_alike
     compute_stiffness = row_edges.compute_row_stiffness
     edge_values = EdgeValues(
         length=float(np.diff(intervals).sum()),
