@@ -55,6 +55,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         Callbacks for a line of text and for the completed fraction.
     """
     kernels = load_kernels(contact, say)
+    snap = make_snapshot if contact.engine is None else contact.engine.make_snapshot
 
     # Blocks of samples with one step each; a block ends at every sample whose state is asked for.
     time = np.asarray(time, float)
@@ -94,7 +95,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         if end in frames:
             force, slip = samples[-1, Sample.PORTS : Sample.PORTS + 2]
             motion = (float(time[end]), float(slide[end]), force, slip, 0.0, 0.0)
-            snapshots.append(make_snapshot(kernels, system, motion))
+            snapshots.append(snap(kernels, system, motion))
         if report is not None:
             report(end / last)
 
