@@ -9,7 +9,6 @@ interface under a constant load. Optional features are:
 
 - `shear`: elastic pieces ([contact.shear]);
 - `joints`: several interfaces, stiffening springs and bands that yaw;
-- `varying-load`: a normal load that changes with the motion;
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
 - `harmonic`: steady motions over one period;
@@ -208,21 +207,21 @@ EFFECTS = {
         "laws.coulomb",
         "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
         ("", "kinetic"),
-        "shear joints varying-load exact pieces grooves march",
+        "shear joints exact pieces grooves march",
         "set-valued timeless memoryless",
     ),
     "friction.law=tanh": _make_law(
         "laws.tanh",
         "F = mu N tanh(v/v_0) (2.4)",
         ("reference_speed", ""),
-        "joints varying-load harmonic grooves march",
+        "joints harmonic grooves march",
         "memoryless creeps",
     ),
     "friction.law=elastic-plastic": _make_law(
         "laws.elastic_plastic",
         "F' = k v, |F| <= mu N (3.12, corrected for reversals), k = stiffness or mu N/bond_length",
         ("bond_length|stiffness", ""),
-        "shear joints varying-load harmonic pieces grooves march",
+        "shear joints harmonic pieces grooves march",
         "timeless",
     ),
     "friction.law=nonlocal": _make_law(
@@ -233,7 +232,7 @@ EFFECTS = {
             "kinetic reading order rest_growth slip_growth rest_speed "
             "initial_bonds spread temperature",
         ),
-        "shear joints varying-load harmonic grooves march",
+        "shear joints harmonic grooves march",
         "bonds",
     ),
     "friction.law=convolution": _make_law(

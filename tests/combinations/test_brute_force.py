@@ -196,7 +196,11 @@ SUPPORTED = {
         ("coulomb", "tanh", "nonlocal", "stiffness", "iwan", "lugre"),
     ),
     "pitch and shear": (PATCH + SHEAR + "{}" + PITCH, 400, ("elastic-plastic", "nonlocal")),
-    "grooves": (POINT + GROOVES.format("normal") + "{}" + RIG, 2000, ("tanh", "elastic-plastic")),
+    "grooves": (
+        POINT + GROOVES.format("normal") + "{}" + RIG,
+        2000,
+        ("tanh", "elastic-plastic", "iwan", "bouc-wen"),
+    ),
     "grooves and cubic spring": (
         POINT + GROOVES.format("normal") + "{}" + RIG.replace("[drive]", CUBIC),
         2000,

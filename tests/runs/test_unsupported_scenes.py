@@ -80,16 +80,6 @@ REFUSALS = [
         "friction.stiffness: .*exclude each other",
     ),
     (
-        BENCH,
-        "friction.law=elastic-plastic; friction.stiffness=7e6 N/m; normal.amplitude=3 N; normal.frequency=50 Hz",
-        "friction.stiffness: .*give bond_length in",
-    ),
-    (
-        COULOMB_RIG,
-        GROOVES + "friction.law=elastic-plastic; friction.stiffness=7e6 N/m",
-        "friction.stiffness: .*give bond_length",
-    ),
-    (
         COULOMB_RIG,
         "friction.law=elastic-plastic; friction.stiffness=7e6 N/m; friction.static=0",
         r"friction\.static: must be > 0 with law 'elastic-plastic'",
@@ -179,11 +169,6 @@ REFUSALS = [
         r"structure\.mode\.\S+: not supported yet with \[contact\.grooves\]",
     ),
     (BLOCK, CONTACT_GROOVES, r"contact\.grooves: .*needs a sliding motion"),
-    (
-        BLOCK + COULOMB + SLIDE,
-        CONTACT_GROOVES + "contact.shear={}; " + TANH,
-        r"friction\.law: law 'tanh' with \[contact\.shear\]",
-    ),
     (
         BLOCK + COULOMB + SLIDE,
         CONTACT_GROOVES + "contact.holder.tangential_stiffness=1e7 N/m",

@@ -4,7 +4,7 @@ In: a model with [slide] and its Patch with the static contact solution, or None
 Out: a `BenchRun`. The pieces may be rigid or deform in shear.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import process_time
 
 import numpy as np
@@ -42,6 +42,7 @@ class BenchRun:
     - seconds: CPU time [s].
     - first: index of the sample at which the last cycle starts.
     - engine: method that computed the friction force.
+    - shear_modes: number of shear modes of the pieces; None without modes.
     """
 
     time: np.ndarray
@@ -58,6 +59,7 @@ class BenchRun:
     seconds: float
     first: int
     engine: BenchEngine
+    shear_modes: int | None = None
 
 
 def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) -> BenchRun:
@@ -76,8 +78,8 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
     path : tuple, optional
         Displacement path in the form of `SlidePath.samples`; default: the path of the model.
     **settings
-        Field `choice` of `BenchEngine`, by default chosen by the tolerance, and fields `say` and `progress` of
-        `SlideTask`.
+        Fields `choice`, by default chosen by the tolerance, and `has_half_cells` of `BenchEngine`, and fields `say` and
+        `progress` of `SlideTask`.
 
     Returns
     -------
@@ -100,6 +102,7 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
         first = int(np.searchsorted(time, start))
 
     engine = choose_bench_engine(model, slide, settings.pop("choice", None))
+    engine = replace(engine, has_half_cells=settings.pop("has_half_cells", False))
     stored = _choose_frames(slide.size, frames)
     histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **settings))
     jumps = reversal_force_rule(model) == "jumps"

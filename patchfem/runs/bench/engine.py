@@ -15,14 +15,16 @@ from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds.parameters import MAX_LIST_SECONDS
+from . import contact_points
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_GROOVE_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
 
 
-# Names of two methods of computing the friction force. Summaries and plans print them, and the code compares with them.
+# Names of methods of computing the friction force. Summaries and plans print them, and the code compares with them.
 CLOSED_FORM = "closed form"
 PARALLEL_ELEMENTS = "parallel elements"
+CONTACT_POINTS = "contact points"
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +33,12 @@ class BenchEngine:
 
     - method: method of computing the friction force.
     - choice: engine of bond summation with its settings; None for other methods.
+    - has_half_cells: whether an Iwan model has half of its cells, to estimate their error.
     """
 
     method: str
     choice: "bond_engines.EngineChoice | None" = None
+    has_half_cells: bool = False
 
     @property
     def name(self) -> str:
@@ -60,6 +64,8 @@ def choose_bench_engine(
     has_bonds = law_has_trait(f.law, "bonds")
     if law_has_trait(f.law, "memoryless") and not model.partial_slip:
         return BenchEngine(CLOSED_FORM)
+    if uses_contact_points(model):
+        return BenchEngine(CONTACT_POINTS)
     if model.partial_slip and (has_bonds or model.grooves is not None):
         is_summed = needs_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
         if model.grooves is not None or not is_summed:
@@ -203,12 +209,19 @@ def refuse_slow_list(seconds: float, limit: float) -> None:
         )
 
 
+def uses_contact_points(model) -> bool:
+    """Return whether a bench run is computed by the points of `contact_points`."""
+    is_soft = bool(model.partial_slip)
+    return contact_points.needs_time_steps(model, is_soft=is_soft, varies=model.load_varies)
+
+
 def uses_parallel_elements(model) -> bool:
     """Return whether the partial slip of a bench run is computed by parallel elements."""
     return (
         model.partial_slip
         and model.grooves is None
         and not law_has_trait(model.friction.law, "bonds")
+        and not uses_contact_points(model)
     )
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import slip
+from ...effects import law_has_trait
 from ...response.coarser import (
     CoarserRuns,
     StepRun,
@@ -20,8 +21,8 @@ from ...response.coarser import (
 )
 from ...response.errors import convergence_errors, finer_errors, friction_errors
 from ..results.patch_rows import Values
-from . import bench, shear
-from .engine import uses_parallel_elements
+from . import bench
+from .engine import CONTACT_POINTS, uses_parallel_elements
 
 # Tolerance that sets the steps of runs on coarser meshes. It differs from that of the run, because
 # parallel elements follow any path exactly.
@@ -37,12 +38,14 @@ class CoarseRun(NamedTuple):
     - level: index of the mesh; 0 is the finest one.
     - choice: engine of bond summation with its settings.
     - modes: number of shear modes of the pieces; None: set by the scene or the tolerance.
+    - has_half_cells: whether an Iwan model has half of its cells.
     """
 
     steps: int
     level: int
     choice: object
     modes: int | None = None
+    has_half_cells: bool = False
 
 
 class BenchErrors(NamedTuple):
@@ -82,9 +85,8 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
         if variant.modes is not None:
             accuracy = model.accuracy.model_copy(update={"shear_modes": variant.modes})
             coarse_model = replace(model, accuracy=accuracy)
-        return bench.run_bench(
-            coarse_model, patches[variant.level], variant.steps, choice=variant.choice, say=say
-        )
+        settings = {"choice": variant.choice, "has_half_cells": variant.has_half_cells, "say": say}
+        return bench.run_bench(coarse_model, patches[variant.level], variant.steps, **settings)
 
     # The runs are stored by their settings, because several estimates share one run.
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
@@ -127,7 +129,6 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
     out = [CoarserRuns((halved, quarter), rule, source="steps")]
 
     has_coarser_mesh = len(patches) > 1
-    patch = patches[0]
     if has_coarser_mesh and uses_parallel_elements(model):
         length = model.friction.bond_length
         steps_on_coarse_mesh = model.slide.steps(
@@ -138,12 +139,17 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
         out.append(CoarserRuns(runs, convergence_errors, reference, "mesh"))
     elif has_coarser_mesh:
         # Both runs have the same number of modes, so that only the mesh changes.
-        count = shear.count_shear_modes(model, patch) if model.partial_slip else None
+        count = fine_run.shear_modes
         coarser = quarter._replace(level=1, modes=count)
         out.append(CoarserRuns((coarser,), second_order_errors, quarter, "mesh"))
         if count:
             coarser = quarter._replace(modes=slip.shear_modes.comparison_mode_count(count))
             out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
+
+    # The cells of an Iwan model represent its continuous density to order 2.
+    if law_has_trait(model.friction.law, "cells") and fine_run.engine.method == CONTACT_POINTS:
+        halved = quarter._replace(has_half_cells=True)
+        out.append(CoarserRuns((halved,), second_order_errors, quarter))
 
     # A merged bond list converges to the full list as its strips become narrower.
     if choice is not None and choice.merge > 0:

@@ -23,7 +23,7 @@ from ..results.result import (
     make_interface_frames,
 )
 from ..results.travel import check_pieces_overlap, warn_of_large_slide
-from . import bench, shear
+from . import bench
 from .engine import nodal_element_limit, steps_per_cycle
 from .errors import BenchErrors, estimate_bench_errors
 
@@ -48,9 +48,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
     measures = add_errors(fine.values, error_estimates.errors, min_relative_error=1e-10)
 
     # The friction ratio has one limit only under a constant load.
-    settings = Settings(fine.engine.name, steps_per_cycle=steps)
-    if model.partial_slip:
-        settings = settings._replace(shear_modes=shear.count_shear_modes(model, patch))
+    settings = Settings(fine.engine.name, steps_per_cycle=steps, shear_modes=fine.shear_modes)
     peak_ratio = None
     if model.friction.static > 0 and not model.load_varies:
         peak_ratio = fine.values["friction_ratio_peak"] / model.friction.static

@@ -5,6 +5,7 @@ that changes (`make_points`); and the fields of grooves. Pieces that deform in s
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,6 +32,7 @@ FALL_RANGE = (1e-2, 20.0)
 N_FALL_SAMPLES = 400
 # Largest growth of the bonds at rest during that slide, relative to the whole growth.
 MAX_FALL_GROWTH = 1e-8
+MAX_MODES = 64  # largest number of shear modes that the tolerance asks for
 # Error of the backbone curve by neglected shear modes, relative to the tolerance.
 SHEAR_MODES_ERROR_RATIO = 0.1
 
@@ -121,10 +123,10 @@ def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts
         # An unstable patch could jump without a change of the drive, so it is rejected as under a constant load.
         length = _find_yield_length(law)
         if steepest_fall := find_steepest_fall(law):
-            _choose_modes(patch, law.static * force, length, 1, 1.0, steepest_fall)
+            choose_modes(patch, law.static * force, Softness(length, steepest_fall), 1, 1.0)
         mean = force.sum() * weight / weight.sum()
         limit = law.static * (force + mean * ADDED_WEIGHT_PRESSURE_FRACTION)
-        shear = _choose_modes(patch, limit, length, n_modes, model.accuracy.tolerance)
+        shear = choose_modes(patch, limit, Softness(length), n_modes, model.accuracy.tolerance)
 
     modes = model.rig.modes
     still = np.zeros(modes.omega.size)
@@ -172,8 +174,21 @@ def find_steepest_fall(law) -> float:
     return max(0.0, float(-(np.diff(force) / np.diff(slide)).min()))
 
 
-def _choose_modes(
-    patch, limit, length: float, n_modes: int | None, tolerance: float, steepest_fall: float = 0.0
+class Softness(NamedTuple):
+    """Properties of a law that decide how many shear modes it needs.
+
+    - length: displacement over which the force of a node grows to its limit [m]; 0 for rigid friction
+    - fall: steepest fall of the friction force over the slip, relative to its limit [1/m]
+    - max_modes: largest number of modes
+    """
+
+    length: float
+    fall: float = 0.0
+    max_modes: int = MAX_MODES
+
+
+def choose_modes(
+    patch, limit, softness: Softness, n_modes: int | None, tolerance: float
 ) -> "shear_modes.ShearModes":
     """Return the shear modes of the pieces by which the interface deforms; without a number, as many as are needed.
 
@@ -186,32 +201,55 @@ def _choose_modes(
         Patch with the shear compliance of its pieces.
     limit : (m,) array
         Friction limits of the nodes [N].
-    length : float
-        Displacement over which the force of a node grows to its limit [m]; 0 for rigid friction.
+    softness : Softness
+        Properties of the law.
     n_modes : int or None
         Number of modes; None: by the tolerance.
     tolerance : float
         Relative tolerance of the scene.
-    steepest_fall : float
-        Steepest fall of the friction force of a node over its slip, relative to its friction limit [1/m].
     """
     compliance = patch.slip_compliance
+    length = softness.length
+    if not length and n_modes is None:
+        # Rigid friction is replaced by a short length, as its number of modes would have no bound.
+        length = MIN_BOND_LENGTH_RATIO * find_gross_slip(patch, limit)
+    bound = SHEAR_MODES_ERROR_RATIO * tolerance
     if patch.model.area is not None:
-        bound = None if n_modes is not None else SHEAR_MODES_ERROR_RATIO * tolerance
         count = n_modes or area_slip.N_AREA_MODES
-        modes = area_slip.choose_area_modes(patch, limit, length, count, bound)
-        shear_modes.require_stability(modes, steepest_fall)
+        modes = area_slip.choose_area_modes(
+            patch, limit, length, count, None if n_modes is not None else bound
+        )
+        shear_modes.require_stability(modes, softness.fall)
         return modes
     if n_modes is not None:
-        return shear_modes.shear_modes(compliance, limit, n_modes, steepest_fall)
+        return shear_modes.shear_modes(compliance, limit, n_modes, softness.fall)
     return shear_modes.find_sufficient_modes(
         compliance,
         limit,
         length,
         shear_modes.N_SHEAR_MODES,
-        SHEAR_MODES_ERROR_RATIO * tolerance,
-        steepest_fall,
+        bound,
+        softness.fall,
+        softness.max_modes,
     )
+
+
+def find_gross_slip(patch, limit) -> float:
+    """Return the slide [m] at which all nodes slip on elastic pieces: the friction limits (m,) [N] over their stiffness."""
+    if patch.model.area is not None:
+        return limit.sum() / area_slip.compute_stick_stiffness(patch, 1.0, 0.0)
+    return limit.sum() / tangential_stiffness(patch.slip_compliance, limit > 0)
+
+
+def find_own_compliance(patch) -> np.ndarray:
+    """Return the shear displacement (m,) [m/N] of each node of a patch under a force of its own."""
+    compliance = patch.slip_compliance
+    if patch.model.area is None:
+        return np.diag(compliance)
+    own = compliance.holder
+    if compliance.cells is not None:
+        own += compliance.cells.self_compliance / compliance.weight
+    return np.full(patch.x.size, compliance.factor * own)
 
 
 def make_flank_contact(model, load: float, patch=None, n_modes: int | None = None):
@@ -261,13 +299,13 @@ def make_flank_contact(model, load: float, patch=None, n_modes: int | None = Non
     # replaces the jump.
     length = _find_yield_length(law)
     if not length:
-        compliance = patch.slip_compliance
-        gross_slip_slide = limit.sum() / tangential_stiffness(compliance, force > 0)
+        gross_slip_slide = find_gross_slip(patch, limit)
         ratio = COULOMB_BOND_LENGTH_RATIO * tolerance
         law = f.model_copy(update={"bond_length": ratio * gross_slip_slide})
         length = max(ratio, MIN_BOND_LENGTH_RATIO) * gross_slip_slide
 
-    reduced = _choose_modes(patch, limit, length, n_modes, tolerance, find_steepest_fall(law))
+    softness = Softness(length, find_steepest_fall(law))
+    reduced = choose_modes(patch, limit, softness, n_modes, tolerance)
 
     # The load of the grooves is distributed over the points as the pressure is.
     shares = force[reduced.points] / force.sum()
@@ -351,9 +389,9 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shea
         if model.side == "lower":
             # A single mode is computed first, because this rejects a patch that could jump at constant
             # displacement.
-            _choose_modes(patch, limit * sigma, law.length, 1, tolerance, fall)
+            choose_modes(patch, limit * sigma, Softness(law.length, fall), 1, tolerance)
             sigma = np.maximum(sigma, UNLOADED_NODE_PRESSURE_FRACTION * mean_loaded_pressure(patch))
-        return _choose_modes(patch, limit * sigma, law.length, n_modes, tolerance, fall)
+        return choose_modes(patch, limit * sigma, Softness(law.length, fall), n_modes, tolerance)
 
     key = ("shear modes", patch, law, model.side, n_modes, tolerance)
     return store.get_or_compute(key, compute)
@@ -362,17 +400,6 @@ def compute_point_shear_modes(model, patch, n_modes: int | None = None) -> "shea
 def mean_loaded_pressure(patch) -> float:
     """Return the mean pressure [Pa] over the loaded nodes."""
     return patch.pressure.load / float(patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0))
-
-
-def count_shear_modes(model, patch) -> int | None:
-    """Return the number of shear modes of a bench run with bonds; None if it uses none."""
-    if (
-        not model.partial_slip
-        or not law_has_trait(model.friction.law, "bonds")
-        or model.grooves is not None
-    ):
-        return None
-    return compute_point_shear_modes(model, patch).stiffness.size
 
 
 def make_lower_contact(model, patch, row, modes, bond_sum) -> "contacts.Contact":

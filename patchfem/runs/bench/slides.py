@@ -18,8 +18,8 @@ from ...friction.record import make_law
 from ...points import contacts, slides
 from ...points.laws import make_elements, make_point_law
 from ..patch import jenkins_elements
-from . import averaged_law, shear
-from .engine import CLOSED_FORM, BenchEngine, BondListGuard, has_changing_pressure
+from . import averaged_law, contact_points, shear
+from .engine import CLOSED_FORM, CONTACT_POINTS, BenchEngine, BondListGuard, has_changing_pressure
 
 N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
 # Largest ratio of created to dissipated energy at which the created energy counts as round-off.
@@ -33,6 +33,7 @@ class SlideHistories(NamedTuple):
     - slip (k,): irreversible part of the displacement [m].
     - ledger (4, k): cumulative work, stored energy, cumulative dissipated and created energy [J].
     - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
+    - shear_modes: number of shear modes of the pieces; None without modes.
     """
 
     force: np.ndarray
@@ -41,6 +42,7 @@ class SlideHistories(NamedTuple):
     ledger: np.ndarray
     tau: np.ndarray
     local: np.ndarray
+    shear_modes: int | None = None
 
 
 class SlideTask(NamedTuple):
@@ -327,7 +329,7 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
         states = [(snapshot.slide, snapshot.stretch) for snapshot in motion.snapshots]
         length = make_law(model.friction).length
         tau, local = slip.fields.compute_element_fields(patch, jenkins_set, states, length)
-    elif model.partial_slip or model.side == "lower":
+    elif contact.point_sets[0].shear is not None or contact.pressure is not None:
         tau, local = shear.compute_point_fields(patch, contact, motion.snapshots)
     else:
         ratio = np.divide(motion.force, load, out=np.zeros_like(load), where=load > 0)[frames]
@@ -337,14 +339,17 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
 
     # The stretch of bonds on rigid pieces is that of their force, at most one bond length.
     has_bonds = law_has_trait(model.friction.law, "bonds") and model.grooves is None
-    if not model.partial_slip and (has_bonds or model.load_varies):
+    has_stretch = contact.engine is None and (has_bonds or model.load_varies)
+    if has_stretch and not model.partial_slip:
         length = model.friction.bond_length or 0.0
         local_slip = task.slide - np.clip(_find_stretch(task, motion.force, load), -length, length)
         stretch = _find_stretch(task, tau, task.evaluate_pressure(frames))
         local = task.slide[frames, None] - stretch
     work = motion.mean * np.diff(task.slide)
     ledger = stack_energies(work, motion.stored, motion.losses)
-    return SlideHistories(motion.force, load, local_slip, ledger, tau, local)
+    shape = contact.point_sets[0].shear
+    count = None if shape is None else shape.stiffness.size
+    return SlideHistories(motion.force, load, local_slip, ledger, tau, local, count)
 
 
 def _find_stretch(task: SlideTask, force, load) -> np.ndarray:
@@ -366,6 +371,11 @@ def _make_contact(task: SlideTask):
     """Return the contact points of a bench, and the JenkinsSet of pieces that are replaced by parallel elements, or None."""
     model = task.model
     friction = model.friction
+    if task.engine.method == CONTACT_POINTS:
+        contact = contact_points.make_contact(
+            model, task.patch, has_half_cells=task.engine.has_half_cells
+        )
+        return contact, None
     row = np.zeros(0)
     has_points = model.grooves is not None or model.load_varies
     if has_points or law_has_trait(friction.law, "bonds"):

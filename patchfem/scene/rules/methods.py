@@ -182,9 +182,7 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
         # Regimes of the elastic-plastic law have springs that come and go with the load.
         is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)
         return law in VARYING_LAWS and not is_fixed
-    if law_has_trait(law, "bonds"):
-        return not (needs_bond_list(joint.law) or motion.lower_shape)
-    return True
+    return not (needs_bond_list(joint.law) or motion.lower_shape)
 
 
 def check_accuracy_method(draft: SceneDraft, kind: str) -> None:

@@ -207,21 +207,7 @@ class Feature(NamedTuple):
 
 # Features that only the friction law has, with a function of the joint that tells whether it has them.
 LAW_FEATURES = {
-    "law with memory for a constant pressure": lambda j: (
-        not j.has_trait("memoryless") and not j.has_trait("bonds") and j.lacks("varying-load")
-    ),
-    "law with memory but without bonds": lambda j: (
-        not j.has_trait("memoryless") and not j.has_trait("bonds")
-    ),
-    "law for rigid pieces": lambda j: (
-        not j.is_interface and not j.has_trait("bonds") and j.lacks("shear")
-    ),
-    "law without parallel elements": lambda j: (
-        not j.has_trait("bonds") and (j.lacks("pieces") or j.lacks("shear"))
-    ),
     "law for one interface": lambda j: j.lacks("joints"),
-    "law for flat faces": lambda j: not j.needs_list and j.lacks("grooves"),
-    "law without bonds": lambda j: not j.has_trait("bonds"),
     "law of an averaged pressure": lambda j: j.has_trait("averaged"),
     "law that sticks rigidly": lambda j: j.has_trait("set-valued") and j.supports("shear"),
 }
@@ -278,9 +264,6 @@ JOINT_FEATURES = {
     ),
     # the sum over bonds
     "sum over all bonds": Feature(lambda j: j.needs_list, "{table_key}.{key_preventing_recursion}"),
-    "sum over all stretched bonds": Feature(
-        lambda j: j.needs_list and j.reading != "report", "{table_key}.{key_preventing_recursion}"
-    ),
     "sum by recursion": Feature(lambda j: not j.needs_list),
     "named method of the sum": Feature(
         lambda j: j.has_trait("bonds") and j.scene.accuracy.quadrature in SINGLE_BOND_SUMS,
@@ -333,10 +316,7 @@ def find_feature(name: str) -> Feature:
 
 
 # What names in braces in the advice of support.toml stand for.
-LAW_ADVICE = {
-    "{laws_with_shear}": suggest_laws("shear"),
-    "{laws_with_varying_load}": suggest_laws("varying-load"),
-}
+LAW_ADVICE = {"{laws_with_shear}": suggest_laws("shear")}
 
 
 def _read_rows() -> tuple[tuple[str, str], ...]:

@@ -1,0 +1,302 @@
+"""Contact points of an interface under every law: at nodes, at the resultant, or behind shear modes of the pieces.
+
+In: a model and its Patch. Out: a `time_steps.contacts.PointSet` for an interface of a rig, or the whole Contact of a bench,
+whose slide is prescribed. Loads follow from time, from the place over the lower piece, from the flank of a groove, or, in a
+rig, from heave and pitch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import friction
+from ...core import MIN_LOAD
+from ...effects import law_has_trait, law_takes_stiffness_or_length
+from ...model.law import make_bond_parameters
+from ...model.model import MIN_RIG_REST_SPEED
+from ...points.march_rows import LOWER
+from ...time_steps import laws
+from ...time_steps.contacts import Contact, PointSet
+from ...time_steps.systems import find_stiffness
+from . import shear
+
+# Largest number of shear modes of laws whose points have the compliance of the modes left out: for Coulomb's law the loop
+# area then has an error of 5e-4
+MAX_MODES = 16
+# Smallest compliance in series with rigid friction at a node, relative to that of the node. All modes of a few nodes leave
+# none out, and the march solves rigid friction only at whole ports. It changes amplitudes by up to 5e-4.
+MIN_NEGLECTED = 1e-2
+MEMORY_LAWS = (
+    "iwan",
+    "bouc-wen",
+    "lugre",
+)  # laws of which `points` knows only one point under a constant load
+
+
+class LowerPlaces(NamedTuple):
+    """Points that slide over the pressure of the lower piece.
+
+    - x (m,): positions of the points [m]; one for the resultant
+    - shares (m,): load [N] of each point where the relative pressure is 1
+    """
+
+    x: np.ndarray
+    shares: np.ndarray
+
+
+class Surface(NamedTuple):
+    """Interface, or a band of its face.
+
+    - keys: effective keys of its law
+    - total: load [N] on the whole contact, to which stiffness and damping in the keys refer
+    - force: mean load of a point [N], or mean loads of the nodes (m,)
+    - soft: Patch whose pieces deform in shear, or None
+    - row (n,): slide per modal coordinate
+    - n_cells: number of cells of an Iwan model
+    - rise: load of the points at the start over their mean load
+    - lower: LowerPlaces if the pressure belongs to the lower piece, or None
+    """
+
+    keys: object
+    total: float
+    force: np.ndarray
+    soft: object
+    row: np.ndarray
+    n_cells: int = laws.N_CELLS
+    rise: float = 1.0
+    lower: LowerPlaces | None = None
+
+
+def needs_time_steps(model, *, is_soft: bool, varies: bool) -> bool:
+    """Return whether only the march of `time_steps` has the law of an interface beside its other effects.
+
+    The march of `points` computes what it can, because its errors have been compared with other programs on more random
+    rigs.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a bench or a rig.
+    is_soft : bool
+        Whether the pieces of an interface deform in shear.
+    varies : bool
+        Whether the load changes in time, or by heave and pitch.
+    """
+    keys = model.friction
+    has_grooves = model.grooves is not None
+    if model.side == "lower" and not law_has_trait(keys.law, "bonds"):
+        return True
+    if keys.law in MEMORY_LAWS:
+        return varies or is_soft or has_grooves
+    if law_has_trait(keys.law, "averaged"):
+        return varies
+    if law_has_trait(keys.law, "set-valued"):
+        return varies and is_soft
+    if law_has_trait(keys.law, "memoryless"):
+        return is_soft or has_grooves
+    is_fixed = keys.stiffness is not None and law_takes_stiffness_or_length(keys.law)
+    return is_fixed and (varies or has_grooves)
+
+
+def make_contact(model, patch, *, has_half_cells: bool = False) -> Contact:
+    """Return the contact points of a bench.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a bench.
+    patch : Patch or None
+        None for a single point.
+    has_half_cells : bool
+        Whether an Iwan model has half of its cells.
+    """
+    fields = find_load_fields(model, patch)
+    force = np.array([model.point.load if patch is None else 0.0])
+    if patch is not None:
+        force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    soft = patch if model.partial_slip else None
+    n_cells = laws.N_CELLS // 2 if has_half_cells else laws.N_CELLS
+    surface = Surface(model.friction, float(force.sum()), force, soft, np.zeros(0), n_cells)
+    surface = place_surface(model, patch, surface)
+    points = make_points(model, surface)
+    limit = model.friction.static * float(force.sum())
+    if model.grooves is not None:
+        limit = model.grooves.max_force(fields["preload"], model.friction.static)
+    return Contact([points], limit, find_length(points), **fields)
+
+
+def place_surface(model, patch, surface: Surface) -> Surface:
+    """Return the surface of the only patch or point of a model with its load at the start and its places on the lower piece.
+
+    Parameters
+    ----------
+    model : Model
+        Grooves, load and side of the shapes.
+    patch : Patch or None
+        None for a single point.
+    surface : Surface
+        The surface under its mean load.
+    """
+    rise = 1.0
+    if model.grooves is not None:
+        # The points carry the normal force on the flank.
+        rise = float(np.hypot(1.0, model.grooves.slope(0.0)))
+    elif model.load_varies:
+        rise = float(model.point.evaluate(np.zeros(1))[0] / model.point.load)
+    lower = None
+    if patch is not None and model.side == "lower" and model.grooves is None:
+        lower = LowerPlaces(np.zeros(1), np.array([surface.force.sum()]))
+        if not _acts_on_resultant(model):
+            shares = shear.mean_loaded_pressure(patch) * patch.pieces.interface.weight
+            lower = LowerPlaces(patch.x, shares)
+    return surface._replace(rise=rise, lower=lower)
+
+
+def find_load_fields(model, patch) -> dict:
+    """Return the fields of a Contact that describe a load that follows from time, the place, or the flank of a groove."""
+    if model.grooves is not None:
+        load = model.point.load if patch is None else float(patch.pressure.load)
+        grooves = model.grooves
+        if model.rig is None:
+            # A prescribed slide has no inertia.
+            grooves = replace(grooves, lifted_mass=0.0)
+        return {"grooves": grooves, "preload": load}
+    if model.load_varies:
+        preload = float(model.point.evaluate(np.zeros(1))[0])
+        return {"load": model.point.evaluate, "preload": preload}
+    if patch is not None and model.side == "lower":
+        return {"pressure": _tabulate_pressure(model, patch)}
+    return {}
+
+
+def _acts_on_resultant(model) -> bool:
+    """Return whether one point carries the load on a patch over the lower piece, which suffices for a law without memory."""
+    return law_has_trait(model.friction.law, "memoryless") and not model.partial_slip
+
+
+def _tabulate_pressure(model, patch) -> np.ndarray:
+    """Return places [m] and relative pressures (2, k) of the lower piece, or slides and relative loads of the resultant.
+
+    The resultant at a slide u is sum A_i p(x_i + u), a polygon with a corner where a node passes another one.
+    """
+    x = patch.x
+    sigma = patch.pressure.sigma_n
+    if not _acts_on_resultant(model):
+        return np.stack([x, sigma / shear.mean_loaded_pressure(patch)])
+    slides = np.unique(x[:, None] - x)
+    pressure = np.interp(slides[:, None] + x, x, sigma, left=0.0, right=0.0)
+    return np.stack([slides, pressure @ patch.pieces.interface.weight / patch.pressure.load])
+
+
+def make_points(
+    model, surface: Surface, n_modes: int | None = None, *, moves: bool = False
+) -> PointSet:
+    """Return the points of a surface.
+
+    Parameters
+    ----------
+    model : Model
+        Model with the tolerance, the number of shear modes, and the expected speed of the slide.
+    surface : Surface
+        Interface or band.
+    n_modes : int, optional
+        Number of shear modes; default: by the scene, otherwise by the tolerance.
+    moves : bool
+        Whether heave and pitch change its pressure, so that every node has a load of its own.
+    """
+    keys = surface.keys
+    has_bonds = law_has_trait(keys.law, "bonds")
+    if has_bonds:
+        min_rest_speed = 0.0 if model.rig is None else MIN_RIG_REST_SPEED
+        law = make_bond_parameters(keys, model.speed_scale, min_rest_speed)
+    else:
+        law = friction.record.make_law(keys, surface.total)
+
+    # Laws without memory act on the resultant.
+    force = surface.force
+    if surface.soft is None:
+        has_nodes = moves or surface.lower is not None
+        if not has_nodes or law_has_trait(keys.law, "memoryless"):
+            return _make_point_set(surface, _make_law_points(surface, law, force.sum()))
+        nodes = np.arange(force.size)
+        return _make_point_set(
+            surface, _make_law_points(surface, law, force), nodes if moves else None
+        )
+
+    # The shear modes of nodes that may be pressed later are weighted with an added pressure.
+    weight = force
+    if moves:
+        weight = force + shear.ADDED_WEIGHT_PRESSURE_FRACTION * force.mean()
+    elif surface.lower is not None:
+        weight = np.maximum(force, shear.UNLOADED_NODE_PRESSURE_FRACTION * force.mean())
+    length = getattr(law, "length", None) or 0.0
+    fall = shear.find_steepest_fall(law) if has_bonds else 0.0
+    most = MAX_MODES if keys.law in laws.STIFF_LAWS else shear.MAX_MODES
+    softness = shear.Softness(length, fall, most)
+    count = n_modes or model.accuracy.shear_modes
+    limit = keys.static * weight
+    modes = shear.choose_modes(surface.soft, limit, softness, count, model.accuracy.tolerance)
+
+    # Rigid friction and that of a speed have the compliance of the modes left out.
+    own = shear.find_own_compliance(surface.soft)[modes.points]
+    neglected = own - (modes.shape**2 / modes.stiffness).sum(axis=1)
+    least = MIN_NEGLECTED if law_has_trait(keys.law, "set-valued") else 0.0
+    points = _make_law_points(surface, law, force[modes.points], np.maximum(neglected, least * own))
+    return _make_point_set(surface, points, modes.points if moves else None, modes)
+
+
+def _make_point_set(surface: Surface, points, nodes=None, modes=None) -> PointSet:
+    """Return the points of a surface as a PointSet, at their places over the lower piece if that has the pressure.
+
+    Parameters
+    ----------
+    surface : Surface
+        Surface of the points.
+    points : laws.PointLaw
+        Law of m points.
+    nodes : (m,) array, optional
+        Nodes whose forces are the loads of the points.
+    modes : ShearModes, optional
+        Shear of the pieces.
+    """
+    point_set = PointSet(points, surface.row, nodes, modes)
+    if surface.lower is None:
+        return point_set
+    x, shares = surface.lower
+    if modes is not None:
+        x = x[modes.points]
+        shares = shares[modes.points]
+    return replace(point_set, nodes=np.full(x.size, LOWER), shares=shares, places=x)
+
+
+def _make_law_points(surface: Surface, law, mean, compliance=0.0) -> laws.PointLaw:
+    """Return points with the law of a surface.
+
+    Parameters
+    ----------
+    surface : Surface
+        Interface or band; a stiffness in its keys is that under the mean load, and does not follow a load that changes.
+    law : friction law
+        Law of the keys.
+    mean : float or (m,) array
+        Mean loads of the points [N].
+    compliance : float or (m,) array
+        Compliance of the shear modes left out [m/N].
+    """
+    keys = surface.keys
+    load = surface.rise * mean
+    if keys.stiffness and law_takes_stiffness_or_length(keys.law):
+        points = laws.make_cells(law.static, law.length, mean, is_fixed=True)
+        return points._replace(load=np.broadcast_to(load, points.load.shape))
+    if keys.law == "iwan":
+        return laws.make_iwan(law, np.maximum(load, MIN_LOAD), surface.n_cells)
+    return laws.make_point_law(keys.law, law, load, compliance)
+
+
+def find_length(point_set: PointSet) -> float:
+    """Return the displacement [m] over which an interface stretches before it slips; 0 for a rigid one."""
+    stiffness = find_stiffness(point_set)
+    return float(point_set.law.limits.sum() / stiffness) if stiffness else 0.0
