@@ -1,8 +1,8 @@
-"""Score the program on the recipe of refused combinations: `python tests/support/brute [--references] [PART ...]`.
+"""Score the program on a recipe: `python tests/support/brute [--march] [--references] [PART ...]`.
 
-Without options every scene that the program accepts is run and compared with `references.json`. `--references`
-computes what that file lacks, from brute force alone. A PART limits the scenes to those whose seed, kind, effect or law it
-is.
+The recipe is that of refused combinations, or with `--march` that of rigs and benches for the march. Without options every
+scene that the program accepts is run and compared with the references of the recipe. `--references` computes what their
+file lacks, from brute force alone. A PART limits the scenes to those whose seed, kind, effect or law it is.
 """
 
 import json
@@ -16,23 +16,23 @@ if __name__ == "__main__":
 
 from campaigns import Row, measure_rows
 
-from brute import recipe, systems
+from brute import march_recipe, recipe, systems
 from patchfem.runs.run import run
 from patchfem.scene import loads
 from patchfem.scene.scene import SceneError
 
 REFERENCES = Path(__file__).with_name("references.json")
+MARCH_REFERENCES = Path(__file__).with_name("march_references.json")
 
 
-def select_scenes(parts: list[str]) -> list[recipe.Scene]:
-    """Return the scenes of the recipe of which one of the `parts` is a property; all scenes without parts."""
-    scenes = recipe.make_scenes()
+def select_scenes(scenes: list[recipe.Scene], parts: list[str]) -> list[recipe.Scene]:
+    """Return the scenes of which one of the `parts` is a property; all scenes without parts."""
     return [scene for scene in scenes if not parts or {*map(str, scene[:4])} & {*parts}]
 
 
-def write_references(scenes) -> None:
-    """Compute the references that the file lacks by brute force."""
-    stored = json.loads(REFERENCES.read_text("utf-8")) if REFERENCES.exists() else {}
+def write_references(scenes, path: Path) -> None:
+    """Compute the references that a file lacks by brute force."""
+    stored = json.loads(path.read_text("utf-8")) if path.exists() else {}
     for scene in scenes:
         if str(scene.seed) in stored:
             continue
@@ -42,7 +42,7 @@ def write_references(scenes) -> None:
             *scene[:4], f"{process_time() - begin:.1f} s, {found.n_unsolved} unsolved", flush=True
         )
         stored[str(scene.seed)] = found._asdict()
-        REFERENCES.write_text(json.dumps(stored, indent=0, sort_keys=True) + "\n", "utf-8")
+        path.write_text(json.dumps(stored, indent=0, sort_keys=True) + "\n", "utf-8")
 
 
 def score_scene(scene: recipe.Scene, reference: dict) -> list[Row] | str:
@@ -56,9 +56,9 @@ def score_scene(scene: recipe.Scene, reference: dict) -> list[Row] | str:
     return measure_rows(result.measures, reference["values"], reference["doubts"])
 
 
-def print_scores(scenes) -> None:
-    """Run scenes and print each row outside its error, and how many hold per law and per effect."""
-    references = json.loads(REFERENCES.read_text("utf-8"))
+def print_scores(scenes, path: Path) -> None:
+    """Run scenes and print each row beside the references of a file, and how many hold per law and per effect."""
+    references = json.loads(path.read_text("utf-8"))
     counts = {True: Counter(), False: Counter()}
     n_refused = Counter()
     for scene in scenes:
@@ -82,11 +82,14 @@ def print_scores(scenes) -> None:
 
 def main(words: list[str]) -> None:
     """Run the command line."""
-    scenes = select_scenes([word for word in words if word != "--references"])
+    is_march = "--march" in words
+    path = MARCH_REFERENCES if is_march else REFERENCES
+    made = march_recipe.make_scenes() if is_march else recipe.make_scenes()
+    scenes = select_scenes(made, [word for word in words if not word.startswith("--")])
     if "--references" in words:
-        write_references(scenes)
+        write_references(scenes, path)
     else:
-        print_scores(scenes)
+        print_scores(scenes, path)
 
 
 if __name__ == "__main__":

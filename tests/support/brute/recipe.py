@@ -101,7 +101,7 @@ def make_scene(seed: int, kind: str, effect: str, law: str) -> Scene:
     if "interfaces" in effect:
         text = _write_interfaces(rng, sizes, effect, law_text, mass)
     else:
-        text = _write_contact(rng, sizes, effect) + "[friction]\n" + law_text
+        text = write_contact(rng, sizes, effect) + "[friction]\n" + law_text
         if kind == "rig":
             text += _write_modes(rng, sizes, effect, mass, frequency)
     if kind == "rig":
@@ -172,13 +172,15 @@ def _write_patch(rng, sizes: Sizes, name: str, shapes: str = "") -> str:
     )
 
 
-def _write_contact(rng, sizes: Sizes, effect: str) -> str:
+def write_contact(rng, sizes: Sizes, effect: str) -> str:
     """Return the tables of a point or a patch that carries the load."""
     slope = rng.uniform(0.02, 0.2)
     wavelength = rng.uniform(1.0, 8.0) * sizes.travel * 1e6
     carved = f'wavelength = "{wavelength:.5g} um"\namplitude = "{slope * wavelength / (2 * np.pi):.5g} um"\n'
-    if effect in ("load", "grooves"):
+    if effect in ("point", "load", "grooves"):
         text = f'[normal]\nload = "{sizes.load:.5f} N"\n'
+        if effect == "point":
+            return text
         if effect == "grooves":
             return f"{text}[normal.grooves]\n{carved}"
         amplitude = sizes.load * rng.uniform(0.1, 0.8)
