@@ -382,7 +382,9 @@ class _Holder:
             # The derivative of the concave dual function along the direction falls from a positive value through 0; the
             # step ends where half of it is left
             slope = float(direction @ error)
-            low, high, length = 0.0, np.inf, 1.0
+            low = 0.0
+            high = np.inf
+            length = 1.0
             for _ in range(2 * MAX_RESTORATIONS):
                 new_error = find_error(shift + length * direction)
                 new_slope = float(direction @ new_error)
