@@ -1,6 +1,6 @@
 """Contact of a patch through an asperity layer of a smooth law under a rigid holder.
 
-With the pressure law P of this layer, the nodal areas A and the notation of `active_set` the equations are
+With the pressure law P of this layer, the nodal areas A and the notation of `unilateral` the equations are
 
     f = A P(s),    s = g - R q + C f,    R^T f + S q = t.
 
@@ -15,9 +15,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ..core import NotConverged, PatchfemError
-from .active_set import ContactProblem
 from .asperity_laws import SmoothAsperities
-from .unilateral import compute_balances, solve
+from .unilateral import ContactProblem, compute_balances, solve
 
 # Largest number of Newton steps; thin layers on rough gaps need up to 40
 MAX_LAYER_NEWTON_STEPS = 60
@@ -234,7 +233,7 @@ def _linearised_start(problem: AsperityProblem) -> tuple[np.ndarray, np.ndarray]
     compliance = problem.compliance + np.diag(1 / (stiffness * problem.area))
     try:
         linear = solve(compliance, contact._replace(gap=contact.gap - first_touch))
-    except (np.linalg.LinAlgError, NotConverged):
+    except NotConverged:
         # The start has uniform separations where the linear problem has no solution.
         approach = contact.gap.mean() - mean_separation[0]
         uniform = np.full(contact.gap.size, mean_separation[0])

@@ -14,16 +14,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
+from ..core import Compliance, Outcome, PatchfemError, frozen_array
 from ..elasticity.lapack import use_one_blas_thread
 from ..formatting import format_length
 from . import asperity_laws
-from .active_set import ContactProblem, make_problem
 from .unilateral import (
     CONTACT_RESIDUAL_TOL,
+    ContactProblem,
     ContactSolution,
     compute_residuals,
-    explain_singular_set,
+    make_problem,
     refuse_residuals,
     solve,
 )
@@ -207,10 +207,7 @@ def _press_bare(compliance: np.ndarray, problem: ContactProblem, start) -> Patch
     if not problem.target.size and problem.gap.min() >= 0:
         solution = ContactSolution(np.zeros(problem.gap.size), np.zeros(0), 0)
     else:
-        try:
-            solution = solve(compliance, problem, start)
-        except np.linalg.LinAlgError:
-            raise NotConverged(explain_singular_set(compliance, problem)) from None
+        solution = solve(compliance, problem, start)
     residuals = compute_residuals(compliance, problem, solution)
     refuse_residuals(residuals, CONTACT_RESIDUAL_TOL)
     opening = problem.gap - problem.motions @ solution.motion + compliance @ solution.force

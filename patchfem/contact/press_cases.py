@@ -9,8 +9,7 @@ case. On a set, the balance of load and moment is a system of two equations for 
     [F_1x F_xx + K] [q    ] = [M + F_x a],
 
 with the resultants F of the forces per unit of each column, the amplitudes a of the shapes, and the stiffness K of the
-holder. The method may cycle; a case that has no set after `MAX_ROUNDS` rounds is left to a method that ends
-(`active_set.solve_primal`).
+holder. The method may cycle; a case that has no set after `MAX_ROUNDS` rounds is solved alone (`unilateral.solve`).
 """
 
 from typing import NamedTuple

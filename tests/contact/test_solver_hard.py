@@ -11,11 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
 from pressed import press, press_to_approach
-from scipy.optimize import nnls
 
-from patchfem.contact import active_set, unilateral
-from patchfem.contact.active_set import make_problem
+from patchfem.contact import unilateral
 from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.unilateral import make_problem
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
 RESIDUAL_TOL = 1e-12  # largest relative residual of a pressed patch, as `press_patch` states it
@@ -174,19 +173,19 @@ def test_exact_load_line_near_tipping_limit(fraction, side):
         assert end_force == pytest.approx(LOAD, rel=200 * (0.5 - fraction))
 
 
-# ---- fallbacks of the active-set method
+# ---- conjugate gradients
 
-# compliance whose active sets cycle from both starting sets
+# compliance whose contact sets cycle from both starting sets
 CYCLE = 1e-9 * np.array([[144.0, -60, 108], [-60, 54, -69], [108, -69, 101]])
 
 
-def test_exact_cycling_sets_are_solved_by_fallbacks():
-    """A problem whose active sets cycle is solved by the fallbacks and agrees with enumeration."""
+def test_exact_cycling_sets_are_solved_by_gradients():
+    """A problem whose contact sets cycle is solved from the set of the gradients and agrees with enumeration."""
     gap = np.array([2e-9, -8e-9, 8e-9])
     x = np.array([-1e-3, 0, 1e-3])
     problem = make_problem(x, gap)
     for start in (gap < 0, np.ones(3, bool)):
-        assert unilateral.solve_on_table(CYCLE, problem, start)[0] is None
+        assert unilateral.solve_on_table(CYCLE, problem, start) is None
     state = press_to_approach(make_pair(x, CYCLE), gap + 8e-9, 8e-9)
     (expected,) = solve_by_enumeration(CYCLE, x, gap)
     assert nodal_forces(make_pair(x, CYCLE), state) == pytest.approx(expected, rel=1e-12)
@@ -203,26 +202,6 @@ def test_exact_gradients_agree_with_enumeration(moment, spring):
     expected = solve_by_enumeration(c, x, gap, 5.0, moment, spring)[0]
     assert force == pytest.approx(expected, abs=5e-5)
     assert n_iterations < 300 and 2 < np.count_nonzero(expected) < 7
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_exact_primal_sets_agree_with_enumeration(seed):
-    """The last method, which exchanges one node at a time, finds the forces from a start with wrong nodes."""
-    rng = np.random.default_rng(seed)
-    n_nodes = 7
-    factor = rng.normal(size=(n_nodes, n_nodes))
-    c = factor @ factor.T + 0.05 * np.eye(n_nodes)
-    x = np.linspace(-1, 1, n_nodes)
-    gap = 100 * rng.normal(size=n_nodes)
-    moment = [None, 30.0][seed % 2]
-    problem = make_problem(x, gap, 100.0, moment)
-
-    # The start carries load and moment on a few nodes
-    start = nnls(problem.motions.T, problem.target)[0]
-    solution, n_sets = active_set.solve_primal(c, problem, start)
-    expected = solve_by_enumeration(c, x, gap, 100.0, moment)[0]
-    assert solution.force == pytest.approx(expected, abs=1e-9 * 100.0)
-    assert 1 < n_sets < 20 * n_nodes and ((start > 0) != (expected > 0)).any()
 
 
 # ---- random gaps on random compliances

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from patchfem.contact import Holder, press_patch
-from patchfem.contact.active_set import make_problem
-from patchfem.contact.unilateral import solve
+from patchfem.contact.unilateral import make_problem, solve
 from patchfem.core import Compliance, Outcome
 
 
