@@ -47,12 +47,9 @@ PUBLIC = {
         "snap_to_steps",
     ),
     "gaps": ("SHAPE_PROPERTIES",),
-    "press": (
-        "Holder",
-        "press_patch",
-    ),
+    "press": ("press_patch",),
     "press_cases": (
-        "HolderCases",
+        "Holders",
         "press_on_table",
     ),
     "press_cells": (

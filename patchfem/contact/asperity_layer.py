@@ -73,13 +73,11 @@ class AsperitySolution(NamedTuple):
     - force (n,): Nodal forces [N].
     - separation (n,): Separations [m] of the mean planes.
     - motion (r,): Approach [m] and rotation [rad] of the holder.
-    - n_iterations: Number of Newton steps.
     """
 
     force: np.ndarray
     separation: np.ndarray
     motion: np.ndarray
-    n_iterations: int
 
 
 class _NewtonStep(NamedTuple):
@@ -143,7 +141,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
     """
     contact = problem.contact
     asperities = problem.asperities
-    for iteration in range(1, MAX_LAYER_NEWTON_STEPS + 1):
+    for _ in range(MAX_LAYER_NEWTON_STEPS):
         # Forces of the law at the separations, and what they leave of the two equations
         log_pressure, decay = asperities.log_pressure(separation)
         log_force = log_pressure + np.log(problem.area)
@@ -177,7 +175,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
             law_force = np.exp(np.minimum(log_force + log_change, MAX_LOG_FORCE))
             new_force = np.maximum(force + force_change, 0.0)
             new_force = np.where(fraction < 1e-15, law_force, new_force)
-            return AsperitySolution(new_force, separation + change, motion, iteration)
+            return AsperitySolution(new_force, separation + change, motion)
 
         # Where the pressure rises, the law is steep, and the step is limited to one that is linear in the pressure; an
         # unloaded node may rise to a small pressure at once
@@ -201,7 +199,7 @@ def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
     gap = problem.contact.gap
     no_motion = np.zeros(0)
     if asperities.log_pressure(gap)[0].max() <= MAX_UNTOUCHED_LOG_PRESSURE:
-        return AsperitySolution(np.zeros(gap.size), gap, no_motion, 0)
+        return AsperitySolution(np.zeros(gap.size), gap, no_motion)
 
     # No node can carry more force than the one that flattens its overlap
     separation = gap

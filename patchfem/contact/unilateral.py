@@ -20,7 +20,7 @@ import numpy as np
 from ..core import NotConverged
 from ..elasticity.lapack import dpotrf
 from . import bounded
-from .press_cases import HolderCases, press_on_table
+from .press_cases import Holders, press_on_table
 from .set_table import SetTable
 
 # Largest relative residual of a solved contact; that of a wrong set is 1e-9 or more
@@ -65,36 +65,30 @@ class ContactSolution(NamedTuple):
 
     - force (n,): Nodal forces [N], > 0 on the contact set and 0 elsewhere.
     - motion (r,): Approach [m] and rotation [rad] q; the rotation is -theta.
-    - n_iterations: Number of contact sets and of gradient steps tried.
     """
 
     force: np.ndarray
     motion: np.ndarray
-    n_iterations: int
 
 
-def make_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
-    """Return the contact problem of a patch, with an unknown motion for each prescribed load.
+def make_problem(x, gap, holder: Holders) -> ContactProblem:
+    """Return the contact problem of a patch, with an unknown motion for each load that the holder prescribes.
 
     Parameters
     ----------
     x, gap : (n,) ndarray
-        Positions [m] along the interface and gap [m].
-    load : float, optional
-        Load [N]; without it the approach is prescribed and contained in the gap.
-    moment : float, optional
-        Moment of the load about x = 0 [N m], the rotation being free; without it the rotation is prescribed.
-    spring : float
-        Stiffness [N m/rad] of the holder against the rotation.
+        Positions [m] along the interface and gap [m], which contains a prescribed approach.
+    holder : Holders
+        Loads and prescribed motions, as numbers.
 
     Returns
     -------
     ContactProblem
     """
-    loads = [value for value in (load, moment) if value is not None]
+    loads = [value for value in (holder.load, holder.moment) if not np.isnan(value)]
     motions = np.ones((len(loads), x.size))
     motions[1:] = x
-    springs = np.array([0.0, spring][: len(loads)])
+    springs = np.array([0.0, holder.spring][: len(loads)])
     return ContactProblem(gap, motions.T, np.array(loads, float), springs)
 
 
@@ -164,7 +158,7 @@ def _solve_on_one_node(compliance: np.ndarray, problem: ContactProblem) -> Conta
         return None
     rotation = 0.0 if lower <= 0 <= upper else (lower + upper) / 2
     approach = gap[node] - rotation * position[node] + displacement[node]
-    return ContactSolution(force, np.array([approach, rotation]), 1)
+    return ContactSolution(force, np.array([approach, rotation]))
 
 
 def solve_on_table(
@@ -202,7 +196,7 @@ def solve_on_table(
         moment = 0.0
 
     table = SetTable(compliance, columns, problem.gap.size, has_ends=False)
-    holder = HolderCases(*np.array([[load], [approach], [moment], [spring]]))
+    holder = Holders(*np.array([[load], [approach], [moment], [spring]]))
     pressed = press_on_table(table, holder, np.ones((1, 1)), start[None])
     if pressed.slot[0] < 0:
         return None
@@ -211,7 +205,7 @@ def solve_on_table(
     motion = pressed.closing[0, :n_motions]
     if n_motions > 1:
         motion[0] -= load_line * motion[1]
-    return ContactSolution(force, motion, table.n_sets)
+    return ContactSolution(force, motion)
 
 
 def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> float:
@@ -277,13 +271,10 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
     return motion
 
 
-def solve(
-    compliance: np.ndarray, problem: ContactProblem, start: np.ndarray | None = None
-) -> ContactSolution:
+def solve(compliance: np.ndarray, problem: ContactProblem) -> ContactSolution:
     """Solve the contact problem of a patch.
 
-    The forces are those of a strictly convex quadratic program, so that neither the set from which the search starts
-    nor the method that finds them changes them.
+    The forces are those of a strictly convex quadratic program, so that the method that finds them does not change them.
 
     Parameters
     ----------
@@ -291,8 +282,6 @@ def solve(
         C [m/N], positive definite.
     problem : ContactProblem
         Gap [m], motions and loads of the nodes.
-    start : (n,) bool ndarray, optional
-        Contact set of a similar problem, which saves iterations.
 
     Returns
     -------
@@ -326,13 +315,12 @@ def solve(
         residuals = compute_residuals(compliance, problem, found)
         return all(value <= CONTACT_RESIDUAL_TOL for value in residuals.values())
 
+    # The search starts from the rest position of a rigid piece. The closing there is about the geometric mean of the
+    # deflections under a point load and under a uniform load.
     rest_motion = find_rest_motion(problem)
-    if start is None:
-        # The closing of the rigid pieces is the geometric mean of the deflections under a point load and a uniform load
-        gap = problem.gap - problem.motions @ rest_motion
-        unit_depth = np.sqrt(np.abs(compliance.diagonal().mean() * compliance.mean()))
-        start = gap < problem.target[:1].sum() * unit_depth
-    solution = search(start, rest_motion)
+    unit_depth = np.sqrt(np.abs(compliance.diagonal().mean() * compliance.mean()))
+    closing = problem.target[:1].sum() * unit_depth
+    solution = search(problem.gap - problem.motions @ rest_motion < closing, rest_motion)
     if solution is not None and not is_exact(solution):
         solution = search(solution.force > 0, solution.motion)
     if not is_exact(solution):
