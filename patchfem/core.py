@@ -14,7 +14,6 @@ rotation opens the gap at +x.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -152,8 +151,6 @@ class ContactState:
     - load: normal force [N].
     - moment: moment of the normal stress about x = 0 [N m].
     - outcome: outcome of the solution.
-    - iterations: number of iterations of the active-set solver.
-    - residuals: relative residuals by name, from a check that is independent of the solver.
     """
 
     sigma_n: np.ndarray
@@ -163,8 +160,6 @@ class ContactState:
     load: float
     moment: float
     outcome: Outcome
-    iterations: int
-    residuals: MappingProxyType
 
 
 class StuckMode(NamedTuple):

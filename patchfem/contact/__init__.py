@@ -7,9 +7,8 @@ forces f or pressures, the gap under load, the approach delta and the rotation t
 
 `gaps` has the shapes of the surfaces. `press_cases` presses many cases of a pair of pieces on a table of contact sets
 (`set_table`), from which `edges` derives where the contacts end. `press.press_patch` presses one patch, bare or with
-asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves it as a single case of a table or, if this fails, by
-the methods of `bounded` and `active_set`, and checks the solution. Read `gaps`, `set_table`, `press_cases` and `press`
-first.
+asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves it as a single case of a table, if need be from the set
+that the gradients of `bounded` show, and checks the solution. Read `gaps`, `set_table`, `press_cases` and `press` first.
 
 `contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `press_path_kernels`).
 
@@ -48,12 +47,9 @@ PUBLIC = {
         "snap_to_steps",
     ),
     "gaps": ("SHAPE_PROPERTIES",),
-    "press": (
-        "Holder",
-        "press_patch",
-    ),
+    "press": ("press_patch",),
     "press_cases": (
-        "HolderCases",
+        "Holders",
         "press_on_table",
     ),
     "press_cells": (

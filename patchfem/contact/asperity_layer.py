@@ -1,6 +1,6 @@
 """Contact of a patch through an asperity layer of a smooth law under a rigid holder.
 
-With the pressure law P of this layer, the nodal areas A and the notation of `active_set` the equations are
+With the pressure law P of this layer, the nodal areas A and the notation of `unilateral` the equations are
 
     f = A P(s),    s = g - R q + C f,    R^T f + S q = t.
 
@@ -15,9 +15,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ..core import NotConverged, PatchfemError
-from .active_set import ContactProblem
 from .asperity_laws import SmoothAsperities
-from .unilateral import compute_balances, solve
+from .unilateral import ContactProblem, compute_balances, solve
 
 # Largest number of Newton steps; thin layers on rough gaps need up to 40
 MAX_LAYER_NEWTON_STEPS = 60
@@ -74,13 +73,11 @@ class AsperitySolution(NamedTuple):
     - force (n,): Nodal forces [N].
     - separation (n,): Separations [m] of the mean planes.
     - motion (r,): Approach [m] and rotation [rad] of the holder.
-    - n_iterations: Number of Newton steps.
     """
 
     force: np.ndarray
     separation: np.ndarray
     motion: np.ndarray
-    n_iterations: int
 
 
 class _NewtonStep(NamedTuple):
@@ -144,7 +141,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
     """
     contact = problem.contact
     asperities = problem.asperities
-    for iteration in range(1, MAX_LAYER_NEWTON_STEPS + 1):
+    for _ in range(MAX_LAYER_NEWTON_STEPS):
         # Forces of the law at the separations, and what they leave of the two equations
         log_pressure, decay = asperities.log_pressure(separation)
         log_force = log_pressure + np.log(problem.area)
@@ -178,7 +175,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
             law_force = np.exp(np.minimum(log_force + log_change, MAX_LOG_FORCE))
             new_force = np.maximum(force + force_change, 0.0)
             new_force = np.where(fraction < 1e-15, law_force, new_force)
-            return AsperitySolution(new_force, separation + change, motion, iteration)
+            return AsperitySolution(new_force, separation + change, motion)
 
         # Where the pressure rises, the law is steep, and the step is limited to one that is linear in the pressure; an
         # unloaded node may rise to a small pressure at once
@@ -202,7 +199,7 @@ def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
     gap = problem.contact.gap
     no_motion = np.zeros(0)
     if asperities.log_pressure(gap)[0].max() <= MAX_UNTOUCHED_LOG_PRESSURE:
-        return AsperitySolution(np.zeros(gap.size), gap, no_motion, 0)
+        return AsperitySolution(np.zeros(gap.size), gap, no_motion)
 
     # No node can carry more force than the one that flattens its overlap
     separation = gap
@@ -234,7 +231,7 @@ def _linearised_start(problem: AsperityProblem) -> tuple[np.ndarray, np.ndarray]
     compliance = problem.compliance + np.diag(1 / (stiffness * problem.area))
     try:
         linear = solve(compliance, contact._replace(gap=contact.gap - first_touch))
-    except (np.linalg.LinAlgError, NotConverged):
+    except NotConverged:
         # The start has uniform separations where the linear problem has no solution.
         approach = contact.gap.mean() - mean_separation[0]
         uniform = np.full(contact.gap.size, mean_separation[0])

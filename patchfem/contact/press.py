@@ -9,46 +9,27 @@ contact follows (`unilateral.solve`); `asperity_layer` solves the other laws.
 """
 
 from dataclasses import replace
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
+from ..core import Compliance, PatchfemError
 from ..elasticity.lapack import use_one_blas_thread
 from ..formatting import format_length
 from . import asperity_laws
-from .active_set import ContactProblem, make_problem
+from .press_cases import MIN_COMPUTABLE_LOAD, Holders
 from .unilateral import (
     CONTACT_RESIDUAL_TOL,
+    ContactProblem,
     ContactSolution,
     compute_residuals,
-    explain_singular_set,
+    make_problem,
     refuse_residuals,
     solve,
 )
 
 # Largest relative residual with a smooth asperity law; rounding errors of steep laws stay below it
 SMOOTH_LAW_RESIDUAL_TOL = 1e-9
-# Smallest load [N] or overlap [m] for which the products in the check of the solution do not underflow
-MIN_COMPUTABLE_LOAD = 1e-200
-
-
-class Holder(NamedTuple):
-    """Loads and prescribed motions of the rigid holder.
-
-    - load: Normal load [N]; None under a prescribed approach.
-    - approach: Approach [m] in place of a load, at a prescribed rotation.
-    - moment: Moment sum f x [N m] of a free rotation, or None if the rotation is prescribed.
-    - spring: Stiffness [N m/rad] against the rotation, unloaded at `rotation`.
-    - rotation: Rotation [rad] that the gap already contains.
-    """
-
-    load: float | None = None
-    approach: float | None = None
-    moment: float | None = None
-    spring: float = 0.0
-    rotation: float = 0.0
 
 
 class PatchState(NamedTuple):
@@ -57,43 +38,27 @@ class PatchState(NamedTuple):
     - force (m,): Nodal forces [N] >= 0.
     - gap (m,): Gap under load [m]; with a smooth asperity law the separation of the mean planes, negative where
       the layer is compressed.
+    - approach, turn: Approach [m], and rotation [rad] that the given gap does not contain.
     - layer_stiffness (m,): Stiffness of a smooth asperity layer [Pa/m]; None without such a layer.
-    - approach, rotation: Approach [m] and rotation [rad] of the holder.
-    - residuals: Relative residuals of the independent check, by name; none without contact.
-    - n_iterations: Number of contact sets or Newton steps.
     """
 
     force: np.ndarray
     gap: np.ndarray
-    layer_stiffness: np.ndarray | None
     approach: float
-    rotation: float
-    residuals: MappingProxyType = MappingProxyType({})
-    n_iterations: int = 0
-
-    @property
-    def load(self) -> float:
-        """Normal load [N]."""
-        return float(self.force.sum())
-
-    @property
-    def outcome(self) -> Outcome:
-        """Whether the pieces touch."""
-        return Outcome.DONE if self.load > 0 else Outcome.NO_CONTACT
+    turn: float
+    layer_stiffness: np.ndarray | None = None
 
 
 def press_patch(
     pieces: Compliance,
     gap: np.ndarray,
-    holder: Holder,
+    holder: Holders,
     asperities: "asperity_laws.LinearAsperities | asperity_laws.SmoothAsperities | None" = None,
-    start: np.ndarray | None = None,
 ) -> PatchState:
     """Solve the contact of a patch that a holder presses.
 
     The nodal forces f >= 0 and the openings w = g - R q + C f >= 0 satisfy f . w = 0 and balance the loads of the holder.
-    The residuals of every solution are computed anew, without any intermediate result of the solver. If nothing
-    touches, the outcome is no_contact.
+    The residuals of every solution are computed anew, without any intermediate result of the solver.
 
     Parameters
     ----------
@@ -101,16 +66,15 @@ def press_patch(
         Compliance of the pieces at the m nodes, without asperities; that of rigid pieces, 0, needs asperities.
     gap : (m,) ndarray
         Gap [m] with the prescribed rotation.
-    holder : Holder
-        Loads and prescribed motions.
+    holder : Holders
+        Loads and prescribed motions, as numbers.
     asperities : LinearAsperities, ExponentialAsperities or HertzAsperities, optional
         Pressure law of the asperities; None if the pieces are bare.
-    start : (m,) bool ndarray, optional
-        Nodes in contact of a similar state, from which the search for the contact set starts.
 
     Returns
     -------
     PatchState
+        All forces are 0 if nothing touches.
 
     Raises
     ------
@@ -122,17 +86,16 @@ def press_patch(
     is_smooth = asperities is not None and asperities.is_smooth
     x = pieces.interface.x
     _refuse_unsolvable(x, gap, holder)
+    touching = float(gap.min())
     if holder.load == 0:
-        no_force = frozen_array(np.zeros(x.size))
-        opening = frozen_array(gap - gap.min())
-        stiffness = no_force if is_smooth else None
-        return PatchState(no_force, opening, stiffness, float(gap.min()), holder.rotation)
+        no_force = np.zeros(x.size)
+        return PatchState(no_force, gap - touching, touching, 0.0, no_force if is_smooth else None)
 
     # A gap that is measured from a point near the contact loses no digits to a large offset.
-    reference = holder.approach or 0.0
-    if holder.approach is None and not is_smooth:
-        reference = float(gap.min())
-    problem = make_problem(x, gap - reference, holder.load, holder.moment, holder.spring)
+    reference = 0.0 if is_smooth else touching
+    if np.isnan(holder.load):
+        reference = holder.approach
+    problem = make_problem(x, gap - reference, holder)
 
     # A linear layer is a compliance in series with the pieces; smooth laws need Newton's method
     with use_one_blas_thread():
@@ -142,12 +105,8 @@ def press_patch(
             compliance = pieces.normal
             if asperities is not None:
                 compliance = compliance + np.diag(1 / (asperities.k * pieces.interface.weight))
-            state = _press_bare(compliance, problem, start)
-
-    # The motion is measured from the gap that was given
-    return state._replace(
-        approach=reference + state.approach, rotation=holder.rotation + state.rotation
-    )
+            state = _press_bare(compliance, problem)
+    return state._replace(approach=float(reference + state.approach))
 
 
 def _press_smooth_layer(pieces: Compliance, problem: ContactProblem, asperities) -> PatchState:
@@ -165,7 +124,7 @@ def _press_smooth_layer(pieces: Compliance, problem: ContactProblem, asperities)
     Returns
     -------
     PatchState
-        Its motion is that of the problem.
+        Its approach is that of the problem.
     """
     from . import asperity_layer
 
@@ -179,10 +138,11 @@ def _press_smooth_layer(pieces: Compliance, problem: ContactProblem, asperities)
     remedy = "; make the rough layer softer (raise the decay length or the height deviation), or leave the layer out"
     refuse_residuals(residuals, SMOOTH_LAW_RESIDUAL_TOL, "contact.asperities", remedy)
     stiffness = asperities.stiffness(solution.separation) * (solution.force > 0)
-    return _make_state(solution, solution.separation, residuals, stiffness)
+    approach, turn = _read_motion(solution.motion)
+    return PatchState(solution.force, solution.separation, approach, turn, stiffness)
 
 
-def _press_bare(compliance: np.ndarray, problem: ContactProblem, start) -> PatchState:
+def _press_bare(compliance: np.ndarray, problem: ContactProblem) -> PatchState:
     """Solve a patch that has no asperity layer, or a linear one that the compliance contains.
 
     Parameters
@@ -191,70 +151,35 @@ def _press_bare(compliance: np.ndarray, problem: ContactProblem, start) -> Patch
         Compliance [m/N] of the nodes.
     problem : ContactProblem
         Gap [m], motions and loads of the m nodes.
-    start : (m,) bool ndarray or None
-        Guess of the nodes in contact.
 
     Returns
     -------
     PatchState
-        Its motion is that of the problem.
-
-    Raises
-    ------
-    NotConverged
-        With a remedy, if the contact set does not determine the motion or a residual is too large.
+        Its approach is that of the problem.
     """
-    if not problem.target.size and problem.gap.min() >= 0:
-        solution = ContactSolution(np.zeros(problem.gap.size), np.zeros(0), 0)
-    else:
-        try:
-            solution = solve(compliance, problem, start)
-        except np.linalg.LinAlgError:
-            raise NotConverged(explain_singular_set(compliance, problem)) from None
-    residuals = compute_residuals(compliance, problem, solution)
-    refuse_residuals(residuals, CONTACT_RESIDUAL_TOL)
+    solution = ContactSolution(np.zeros(problem.gap.size), np.zeros(0))
+    if problem.target.size or problem.gap.min() < 0:
+        solution = solve(compliance, problem)
+    refuse_residuals(compute_residuals(compliance, problem, solution), CONTACT_RESIDUAL_TOL)
     opening = problem.gap - problem.motions @ solution.motion + compliance @ solution.force
     opening = np.where(solution.force > 0, 0.0, np.maximum(opening, 0.0))
-    return _make_state(solution, opening, residuals)
+    return PatchState(solution.force, opening, *_read_motion(solution.motion))
 
 
-def _make_state(
-    solution, opening: np.ndarray, residuals: dict[str, float], stiffness: np.ndarray | None = None
-) -> PatchState:
-    """Return the state of a patch from its solution.
-
-    Parameters
-    ----------
-    solution : ContactSolution or AsperitySolution
-        Forces (m,) [N] and motion (r,) of the free motions.
-    opening : (m,) ndarray
-        Gap under load [m].
-    residuals : dict of float
-        Residuals of the solution by name.
-    stiffness : (m,) ndarray, optional
-        Stiffness of a smooth asperity layer [Pa/m].
-    """
-    motion = np.zeros(2)
-    motion[: solution.motion.size] = solution.motion
-    return PatchState(
-        frozen_array(solution.force),
-        frozen_array(opening),
-        stiffness if stiffness is None else frozen_array(stiffness),
-        approach=float(motion[0]),
-        rotation=-float(motion[1]),
-        residuals=MappingProxyType(residuals),
-        n_iterations=solution.n_iterations,
-    )
+def _read_motion(motion: np.ndarray) -> tuple[float, float]:
+    """Return approach [m] and rotation [rad] of the free motions (r,) of a holder; 0 for a prescribed one."""
+    approach, rotation = np.append(motion, [0.0, 0.0])[:2].tolist()
+    return approach, -rotation
 
 
-def _refuse_unsolvable(x: np.ndarray, gap: np.ndarray, holder: Holder) -> None:
+def _refuse_unsolvable(x: np.ndarray, gap: np.ndarray, holder: Holders) -> None:
     """Raise PatchfemError for loads and approaches that numbers cannot represent, and for pieces that tip over.
 
     `gap` (m,) [m] is that of the nodes at `x` (m,) [m] without load, and `holder` has the loads and prescribed motions. The
     load line of a free rotation lies at x = moment/load.
     """
     load = holder.load
-    if load is None:
+    if np.isnan(load) and not np.isnan(holder.approach):
         overlap = holder.approach - gap.min()
         if 0 < overlap < MIN_COMPUTABLE_LOAD:
             raise PatchfemError(
@@ -269,7 +194,7 @@ def _refuse_unsolvable(x: np.ndarray, gap: np.ndarray, holder: Holder) -> None:
         )
 
     # A free rotation tips over if the load line lies outside the pieces.
-    if load and holder.moment is not None and not holder.spring:
+    if load and not (np.isnan(holder.moment) or holder.spring):
         load_line = holder.moment / load
         half_length = np.ptp(x) / 2 * (1 - 1e-13)
         if not abs(load_line - (x[0] + x[-1]) / 2) < half_length:

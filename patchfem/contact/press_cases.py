@@ -9,8 +9,7 @@ case. On a set, the balance of load and moment is a system of two equations for 
     [F_1x F_xx + K] [q    ] = [M + F_x a],
 
 with the resultants F of the forces per unit of each column, the amplitudes a of the shapes, and the stiffness K of the
-holder. The method may cycle; a case that has no set after `MAX_ROUNDS` rounds is left to a method that ends
-(`active_set.solve_primal`).
+holder. The method may cycle; a case that has no set after `MAX_ROUNDS` rounds is solved alone (`unilateral.solve`).
 """
 
 from typing import NamedTuple
@@ -19,6 +18,8 @@ import numpy as np
 
 from .set_table import SetTable
 
+# Smallest load [N] or overlap [m] for which the products in the check of a solution do not underflow
+MIN_COMPUTABLE_LOAD = 1e-200
 MAX_ROUNDS = 40  # number of rounds after which a case counts as cycling; 3 to 20 are usual
 # Rounding error of an opening, relative to the sum of the magnitudes of its terms
 OPENING_ROUND_OFF = 1e-13
@@ -30,8 +31,8 @@ MAX_RESIDUAL = (
 MAX_CHUNK_VALUES = 4_000_000  # numbers of a temporary array (n, q, m), 32 MB
 
 
-class HolderCases(NamedTuple):
-    """Loads and prescribed motions of n rigid holders.
+class Holders(NamedTuple):
+    """Loads and prescribed motions of n rigid holders, or numbers of a single one.
 
     - load (n,): normal load [N]; NaN where the approach is prescribed.
     - approach (n,): prescribed approach [m]; NaN under a load.
@@ -39,19 +40,26 @@ class HolderCases(NamedTuple):
     - spring (n,): stiffness [N m/rad] of the holder against the rotation.
     """
 
-    load: np.ndarray
-    approach: np.ndarray
-    moment: np.ndarray
-    spring: np.ndarray
+    load: np.ndarray | float
+    approach: np.ndarray | float = np.nan
+    moment: np.ndarray | float = np.nan
+    spring: np.ndarray | float = 0.0
 
-    def take(self, rows) -> "HolderCases":
+    def take(self, rows) -> "Holders":
         """Return selected holders; `rows` are indices or a mask (n,)."""
-        return HolderCases(*(column[rows] for column in self))
+        return Holders(*(column[rows] for column in self))
 
     @property
     def can_rotate(self) -> np.ndarray:
         """Whether the rotation is free (n,)."""
         return ~np.isnan(self.moment)
+
+    def are_computable(self, smallest_gap: np.ndarray) -> np.ndarray:
+        """Return whether numbers represent the loads and overlaps (n,); `smallest_gap` (n,) [m] is that without load."""
+        is_prescribed = np.isnan(self.load)
+        size = np.where(is_prescribed, self.approach - smallest_gap, self.load)
+        is_open = (size == 0) | (is_prescribed & (size < 0))
+        return is_open | ((size >= MIN_COMPUTABLE_LOAD) & (size <= 1 / MIN_COMPUTABLE_LOAD))
 
 
 class PressedSets(NamedTuple):
@@ -72,14 +80,14 @@ class PressedSets(NamedTuple):
         return (self.slot >= 0) & (self.residual <= MAX_RESIDUAL)
 
 
-def press_on_table(table: SetTable, holders: HolderCases, amplitudes, start) -> PressedSets:
+def press_on_table(table: SetTable, holders: Holders, amplitudes, start) -> PressedSets:
     """Find the contact set and the motion of the holder of each case.
 
     Parameters
     ----------
     table : SetTable
         Contact sets; its first two columns are 1 and x, the other p are the gap shapes.
-    holders : HolderCases
+    holders : Holders
         n holders.
     amplitudes : (n, p) ndarray
         Factors of the gap shapes.
@@ -136,7 +144,7 @@ def press_on_table(table: SetTable, holders: HolderCases, amplitudes, start) -> 
     return PressedSets(slot, closing, residual)
 
 
-def _complete_sets(table: SetTable, holders: HolderCases, amplitudes, active, rows) -> None:
+def _complete_sets(table: SetTable, holders: Holders, amplitudes, active, rows) -> None:
     """Add nodes to the contact sets of some cases until they can carry the load, in place.
 
     An empty set under a load gets the nodes whose gap is below the closing of soft pieces, the geometric mean of the
@@ -171,14 +179,14 @@ def _complete_sets(table: SetTable, holders: HolderCases, amplitudes, active, ro
             own[np.argmin(np.where(is_side, gap[k], np.inf))] = True
 
 
-def _balance(table: SetTable, holders: HolderCases, slots, closing) -> np.ndarray:
+def _balance(table: SetTable, holders: Holders, slots, closing) -> np.ndarray:
     """Return coefficients (n, q) of the columns whose forces on given sets balance load and moment.
 
     Parameters
     ----------
     table : SetTable
         Contact sets.
-    holders : HolderCases
+    holders : Holders
         Loads of the cases.
     slots : (n,) ndarray
         Contact sets.
@@ -194,7 +202,7 @@ def _balance(table: SetTable, holders: HolderCases, slots, closing) -> np.ndarra
     return out
 
 
-def _solve_motion(resultants, holders: HolderCases, missing) -> np.ndarray:
+def _solve_motion(resultants, holders: Holders, missing) -> np.ndarray:
     """Return approach and rotation (n, 2) whose forces are the missing load and moment (n, 2).
 
     A prescribed rotation does not change, and neither does a prescribed approach, whose change is NaN. `resultants`
@@ -225,7 +233,7 @@ def _find_wrong_nodes(table: SetTable, slots, closing, unknown) -> np.ndarray:
 
 
 def _refine_balance(
-    table: SetTable, holders: HolderCases, slots, closing
+    table: SetTable, holders: Holders, slots, closing
 ) -> tuple[np.ndarray, np.ndarray]:
     """Correct the motion by what the summed forces do not balance; return coefficients (n, q) and residuals (n,).
 
@@ -236,7 +244,7 @@ def _refine_balance(
     ----------
     table : SetTable
         Contact sets.
-    holders : HolderCases
+    holders : Holders
         Loads of the cases.
     slots : (n,) ndarray
         Contact sets.
@@ -247,9 +255,13 @@ def _refine_balance(
     x = table.columns[1]
     resultants = table.work[slots]
 
+    def compute_force(coefficients) -> np.ndarray:
+        """Return the nodal forces (n, m) [N]."""
+        return np.where(active, table.combine(slots, coefficients), 0.0)
+
     def find_missing(coefficients) -> np.ndarray:
         """Return load and moment (n, 2) that the forces do not balance."""
-        force = np.where(active, table.combine(slots, coefficients), 0.0)
+        force = compute_force(coefficients)
         by_spring = holders.spring * coefficients[:, 1]
         return np.stack(
             [holders.load - force.sum(axis=1), holders.moment - force @ x - by_spring], axis=1
@@ -268,4 +280,9 @@ def _refine_balance(
         smallest = np.where(active, terms, np.inf).min(axis=1)
         opening = (np.abs(closing) * table.round_off[slots]).sum(axis=1) / smallest
     residual = np.fmax(np.fmax(balance, opening), 0.0)
-    return closing, np.where(np.isfinite(closing).all(axis=1), residual, np.inf)
+
+    # A single node in contact does not determine a free rotation
+    is_free = holders.can_rotate & (holders.spring == 0)
+    is_determined = ~is_free | (np.count_nonzero(compute_force(closing) > 0, axis=1) > 1)
+    is_determined &= np.isfinite(closing).all(axis=1)
+    return closing, np.where(is_determined, residual, np.inf)

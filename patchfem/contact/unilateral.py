@@ -1,12 +1,16 @@
-"""Unilateral contact of the condensed interface: solution and independent check.
+"""Unilateral contact of the nodes of a patch under one rigid holder: solution and independent check.
 
-Find nodal forces f >= 0 with w = g + theta x - delta + C f >= 0 and f . w = 0. Either the approach delta is
-prescribed, or the load sum f = N. Under a load the rotation theta is prescribed (it is part of g), free under a moment,
-sum f x = M, or held by the spring of the holder, sum f x = M + K theta.
+Find nodal forces f >= 0 and a motion q of the holder such that
 
-`solve` measures the gap from the rest position of a rigid piece and finds the contact set on a table of contact sets
-(`press_cases`); where that cycles, conjugate gradients and the primal active-set method follow. `compute_residuals`
-checks every solution again and shares no intermediate result with the solver.
+    w = g - R q + C f >= 0,    f . w = 0,    R^T f + S q = t,
+
+with the gap g, the closing R of the nodes per unit of each free motion, the compliance C, the springs S of the holder
+and the prescribed load and moment t. Without free motions the approach is prescribed and contained in the gap.
+
+`solve` finds the contact set on a table of contact sets (`press_cases`), and again with the gap measured from the motion
+found, which loses no digits to large motions. Where the sets cycle, the search starts from the set of conjugate gradients
+(`bounded`), which reach the minimum of the energy f . C f/2 + g . f. `compute_residuals` decides whether a solution counts.
+It shares no intermediate result with the solver.
 """
 
 from typing import NamedTuple
@@ -14,23 +18,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import NotConverged
+from ..elasticity.lapack import dpotrf
 from . import bounded
-from .active_set import (
-    OPENING_ROUND_OFF,
-    ContactProblem,
-    SetSolution,
-    compute_relative_violation,
-    factorise,
-    find_rest_motion,
-    solve_primal,
-)
-from .press_cases import HolderCases, press_on_table
+from .press_cases import Holders, press_on_table
 from .set_table import SetTable
 
 # Largest relative residual of a solved contact; that of a wrong set is 1e-9 or more
 CONTACT_RESIDUAL_TOL = 1e-12
-# Largest residual of the conjugate gradients, from which the primal active-set method goes on
+# Largest residual of the conjugate gradients, whose forces then show the contact set
 GRADIENT_RESIDUAL_TOL = 1e-11
+# Rounding error of an opening, relative to the sum of the magnitudes of its terms
+OPENING_ROUND_OFF = 1e-14
 # Message about a compliance that is not positive definite
 INDEFINITE_COMPLIANCE_MESSAGE = (
     "contact: the compliance of the pieces is not positive definite to working precision; raise "
@@ -41,17 +39,57 @@ INDEFINITE_COMPLIANCE_MESSAGE = (
 MIN_TOTAL_FORCE = 1e-200
 
 
+class ContactProblem(NamedTuple):
+    """Contact of the n nodes of a patch that is pressed by a rigid holder with r free motions.
+
+    - gap (n,): Gap [m] between the undeformed surfaces; negative where they overlap under a given approach.
+    - motions (n, r): Closing of each node per unit of each free motion: ones for the approach [m], then the positions
+      [m] for the rotation. No column: the approach is prescribed and already contained in the gap.
+    - target (r,): Load [N], then the moment about x = 0 [N m] of a free rotation.
+    - springs (r,): Stiffness of the holder against each motion: 0 for the approach, [N m/rad] for the rotation.
+    """
+
+    gap: np.ndarray
+    motions: np.ndarray
+    target: np.ndarray
+    springs: np.ndarray
+
+    @property
+    def has_free_rotation(self) -> bool:
+        """Whether the holder rotates and no spring restrains it."""
+        return self.springs.size == 2 and self.springs[1] == 0
+
+
 class ContactSolution(NamedTuple):
     """Solution of a contact problem: nodal forces and motion of the holder.
 
     - force (n,): Nodal forces [N], > 0 on the contact set and 0 elsewhere.
     - motion (r,): Approach [m] and rotation [rad] q; the rotation is -theta.
-    - n_iterations: Number of contact sets and of gradient steps tried.
     """
 
     force: np.ndarray
     motion: np.ndarray
-    n_iterations: int
+
+
+def make_problem(x, gap, holder: Holders) -> ContactProblem:
+    """Return the contact problem of a patch, with an unknown motion for each load that the holder prescribes.
+
+    Parameters
+    ----------
+    x, gap : (n,) ndarray
+        Positions [m] along the interface and gap [m], which contains a prescribed approach.
+    holder : Holders
+        Loads and prescribed motions, as numbers.
+
+    Returns
+    -------
+    ContactProblem
+    """
+    loads = [value for value in (holder.load, holder.moment) if not np.isnan(value)]
+    motions = np.ones((len(loads), x.size))
+    motions[1:] = x
+    springs = np.array([0.0, holder.spring][: len(loads)])
+    return ContactProblem(gap, motions.T, np.array(loads, float), springs)
 
 
 class _NodalCompliance:
@@ -90,22 +128,11 @@ def solve_by_gradients(
     return bounded.solve_bounded(operator, program, tolerance=GRADIENT_RESIDUAL_TOL)
 
 
-def _solve_on_one_node(
-    compliance, problem: ContactProblem, rest_rotation: float
-) -> SetSolution | None:
-    """Solve a patch that touches at a single node, or return None if no node qualifies.
+def _solve_on_one_node(compliance: np.ndarray, problem: ContactProblem) -> ContactSolution | None:
+    """Solve a patch under a free rotation that touches at a single node, or return None if no node qualifies.
 
-    The node lies under the load line. Any rotation that leaves the other nodes open is a solution. It is that without
-    rotation of the holder if the other nodes are open then, else the mean of the two limits.
-
-    Parameters
-    ----------
-    compliance : (n, n) ndarray
-        Compliance of the nodes [m/N].
-    problem : ContactProblem
-        Gap, motions of the holder and prescribed load and moment.
-    rest_rotation : float
-        Rotation q [rad] that is already contained in the gap.
+    The node lies under the load line. Any rotation that leaves the other nodes open is a solution. It is 0 if the other
+    nodes are open then, else the mean of the two limits. `compliance` (n, n) [m/N] is that of the nodes.
     """
     gap = problem.gap
     position = problem.motions[:, 1]
@@ -129,20 +156,14 @@ def _solve_on_one_node(
     upper = bound[arm > 0].min(initial=np.inf)
     if not lower <= upper:
         return None
-
-    rotation = -rest_rotation if lower <= -rest_rotation <= upper else (lower + upper) / 2
+    rotation = 0.0 if lower <= 0 <= upper else (lower + upper) / 2
     approach = gap[node] - rotation * position[node] + displacement[node]
-    return SetSolution(
-        force=force,
-        opening=height - rotation * arm,
-        scale=np.abs(height) + abs(displacement[node]) + np.abs(rotation * arm),
-        motion=np.array([approach, rotation]),
-    )
+    return ContactSolution(force, np.array([approach, rotation]))
 
 
 def solve_on_table(
     compliance: np.ndarray, problem: ContactProblem, start: np.ndarray
-) -> tuple[SetSolution | None, int]:
+) -> ContactSolution | None:
     """Solve a contact problem as the only case of a table of contact sets.
 
     Parameters
@@ -152,111 +173,162 @@ def solve_on_table(
     problem : ContactProblem
         Gap [m], motions and loads of the nodes.
     start : (n,) bool ndarray
-        First contact set.
+        First contact set; an empty one is replaced by a guess.
 
     Returns
     -------
-    solution : SetSolution or None
-        None if no set meets the contact conditions to round-off.
-    n_iterations : int
-        Number of contact sets tried.
+    ContactSolution or None
+        None if the sets cycle, or if the compliance is not positive definite on one of them.
     """
+    # A prescribed approach is contained in the gap. Under a rotation the positions are measured from the load line, near
+    # which a small contact lies, so that approach and rotation are well determined.
     n_motions = problem.target.size
+    load, moment = np.append(problem.target, [np.nan, np.nan])[:2]
+    approach = np.nan if n_motions else 0.0
+    spring = 0.0
     columns = np.zeros((3, problem.gap.size))
     columns[0] = 1.0
-    columns[1:n_motions] = problem.motions.T[1:]
     columns[2] = problem.gap
+    if n_motions > 1:
+        spring = problem.springs[1]
+        load_line = moment / load
+        columns[1] = problem.motions[:, 1] - load_line
+        moment = 0.0
+
     table = SetTable(compliance, columns, problem.gap.size, has_ends=False)
-
-    # A prescribed approach is contained in the gap
-    load, moment = np.append(problem.target, [np.nan, np.nan])[:2]
-    spring = problem.springs[1] if n_motions > 1 else 0.0
-    approach = np.nan if n_motions else 0.0
-    holder = HolderCases(*np.array([[load], [approach], [moment], [spring]]))
+    holder = Holders(*np.array([[load], [approach], [moment], [spring]]))
     pressed = press_on_table(table, holder, np.ones((1, 1)), start[None])
-    if not pressed.is_solved[0]:
-        return None, table.n_sets
-
+    if pressed.slot[0] < 0:
+        return None
     unknown = table.combine(pressed.slot, pressed.closing)[0]
-    active = table.active[pressed.slot[0]]
-    solution = SetSolution(
-        force=np.where(active, unknown, 0.0),
-        opening=np.where(active, 0.0, unknown),
-        scale=np.abs(pressed.closing[0]) @ np.abs(columns),
-        motion=pressed.closing[0, :n_motions],
-    )
-    if not compute_relative_violation(solution) <= CONTACT_RESIDUAL_TOL:
-        return None, table.n_sets
-    return solution, table.n_sets
+    force = np.where(table.active[pressed.slot[0]], unknown, 0.0)
+    motion = pressed.closing[0, :n_motions]
+    if n_motions > 1:
+        motion[0] -= load_line * motion[1]
+    return ContactSolution(force, motion)
 
 
-def _guess_contact_set(compliance: np.ndarray, problem: ContactProblem) -> np.ndarray:
-    """Guess the nodes in contact (n,) of a problem from the gap between rigid pieces in equilibrium.
+def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> float:
+    """Return the rotation [rad] at which a rigid piece is in equilibrium under load and moment.
 
-    The closing is estimated as the geometric mean of the deflections under a point load and under a uniform load.
-    Under a prescribed approach these are the nodes that overlap. `compliance` (n, n) [m/N] is that of the nodes.
+    The piece rests on the edge of the lower convex hull of the gap below the load line; against a spring it may rest
+    on one corner.
+
+    Parameters
+    ----------
+    x, gap : (m,) ndarray
+        Increasing positions and gap [m].
+    load, moment, spring : float
+        Load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
+
+    Returns
+    -------
+    float
+        Rotation that opens the gap at positive x [rad].
     """
+    left_index = 0
+    right = x.size - 1
+    while left_index < right:
+        # Rotation at which the piece would rest on both nodes
+        theta = -(gap[right] - gap[left_index]) / (x[right] - x[left_index])
+        height = gap + theta * x
+        lowest = int(np.argmin(height))
+
+        # A node between them touches first. The side of it that the load line is on keeps the support.
+        if left_index < lowest < right and height[lowest] < min(height[left_index], height[right]):
+            imbalance = load * x[lowest] - moment - spring * theta
+            if imbalance == 0:
+                return float(theta)
+            if imbalance > 0:
+                right = lowest
+            else:
+                left_index = lowest
+        # Both nodes touch. Against a spring the moment may lift the piece off one of them.
+        elif spring > 0 and load * x[left_index] - moment - spring * theta > 0:
+            right = left_index
+        elif spring > 0 and load * x[right] - moment - spring * theta < 0:
+            left_index = right
+        else:
+            return float(theta)
+
+    # The piece rests on one node, and the spring balances the moment
+    return float((load * x[left_index] - moment) / spring)
+
+
+def find_rest_motion(problem: ContactProblem) -> np.ndarray:
+    """Return approach [m] and rotation [rad] q (r,) at which a rigid piece rests on the other one.
+
+    `problem` has the gap of the nodes and the loads; without a load r is 0.
+    """
+    motion = np.zeros(problem.target.size)
     gap = problem.gap
-    if not problem.target.size:
-        return gap < 0
-    unit_depth = np.sqrt(np.abs(compliance.diagonal().mean() * compliance.mean()))
-    return gap <= gap.min() + problem.target[0] * unit_depth
+    if motion.size > 1:
+        load, moment = problem.target
+        position = problem.motions[:, 1]
+        motion[1] = -find_rest_rotation(position, gap, load, moment, problem.springs[1])
+        gap = gap - motion[1] * position
+    motion[:1] = gap.min()
+    return motion
 
 
-def solve(
-    compliance: np.ndarray, problem: ContactProblem, start: np.ndarray | None = None
-) -> ContactSolution:
+def solve(compliance: np.ndarray, problem: ContactProblem) -> ContactSolution:
     """Solve the contact problem of a patch.
 
-    The forces are those of a strictly convex quadratic program, so that neither the set from which the search starts
-    nor the method that finds them changes them. The residuals of every pressed patch are computed anew
-    (`compute_residuals`).
+    The forces are those of a strictly convex quadratic program, so that the method that finds them does not change them.
 
     Parameters
     ----------
     compliance : (n, n) ndarray
         C [m/N], positive definite.
     problem : ContactProblem
-        Without a free rotation, its gap [m] is measured from a point near the contact: an offset costs digits.
-    start : (n,) bool ndarray, optional
-        Contact set of a similar problem, which saves iterations.
+        Gap [m], motions and loads of the nodes.
 
     Returns
     -------
     ContactSolution
+        The most accurate one that was found; `refuse_residuals` decides whether it is accurate enough.
 
     Raises
     ------
     NotConverged
-        If all methods fail.
-    LinAlgError
-        If the compliance is not positive definite.
+        With a remedy, if no contact set can be solved for.
     """
-    # The gap is measured from the rest position of a rigid piece, which may close it by far more than the pieces deform
-    rest_motion = np.zeros(problem.target.size)
-    if rest_motion.size > 1:
-        rest_motion = find_rest_motion(problem)
-        problem = problem._replace(
-            gap=problem.gap - problem.motions @ rest_motion,
-            target=problem.target - problem.springs * rest_motion,
-        )
-
     # A patch that may rotate freely can rest on a single node, whose set does not determine the rotation
-    solution = None
-    n_iterations = 0
     if problem.has_free_rotation:
-        solution = _solve_on_one_node(compliance, problem, rest_motion[1])
-    if solution is None:
-        if start is None or np.count_nonzero(start) < problem.min_nodes:
-            start = _guess_contact_set(compliance, problem)
-        solution, n_iterations = solve_on_table(compliance, problem, start)
+        solution = _solve_on_one_node(compliance, problem)
+        if solution is not None:
+            return solution
 
-    # The primal method always ends; from the forces of the gradients it takes few steps
-    if solution is None:
+    def search(active: np.ndarray, motion: np.ndarray) -> ContactSolution | None:
+        """Return the solution that is found from a contact set (n,), with the gap measured from a motion (r,)."""
+        moved = problem._replace(
+            gap=problem.gap - problem.motions @ motion,
+            target=problem.target - problem.springs * motion,
+        )
+        found = solve_on_table(compliance, moved, active)
+        return found and found._replace(motion=found.motion + motion)
+
+    def is_exact(found: ContactSolution | None) -> bool:
+        """Return whether a solution meets the contact conditions to round-off."""
+        if found is None:
+            return False
+        residuals = compute_residuals(compliance, problem, found)
+        return all(value <= CONTACT_RESIDUAL_TOL for value in residuals.values())
+
+    # The search starts from the rest position of a rigid piece. The closing there is about the geometric mean of the
+    # deflections under a point load and under a uniform load.
+    rest_motion = find_rest_motion(problem)
+    unit_depth = np.sqrt(np.abs(compliance.diagonal().mean() * compliance.mean()))
+    closing = problem.target[:1].sum() * unit_depth
+    solution = search(problem.gap - problem.motions @ rest_motion < closing, rest_motion)
+    if solution is not None and not is_exact(solution):
+        solution = search(solution.force > 0, solution.motion)
+    if not is_exact(solution):
         by_gradients = solve_by_gradients(compliance, problem)
-        solution, n_sets = solve_primal(compliance, problem, by_gradients.traction)
-        n_iterations += by_gradients.n_iterations + n_sets
-    return ContactSolution(solution.force, solution.motion + rest_motion, n_iterations)
+        solution = search(by_gradients.traction > 0, by_gradients.motion)
+    if solution is None:
+        raise NotConverged(explain_singular_set(compliance, problem))
+    return solution
 
 
 def compute_residuals(
@@ -335,9 +407,7 @@ def explain_singular_set(compliance: np.ndarray, problem: ContactProblem) -> str
     problem : ContactProblem
         Problem whose equations are singular.
     """
-    try:
-        factorise(np.array(compliance, order="C"))
-    except np.linalg.LinAlgError:
+    if dpotrf(compliance.T, lower=1)[1]:
         return INDEFINITE_COMPLIANCE_MESSAGE
     if problem.target.size < 2:
         return (

@@ -140,13 +140,6 @@ class Gap:
         longest = longest_loaded_cell(x, loaded_nodes)
         return float(max(longest, self.average or profiles.find_sample_spacing(self.profile)))
 
-    def half_step_heights(self, x) -> np.ndarray:
-        """Return half the height [m] of the step at each node x (m,) [m], or 0 at nodes without a step edge."""
-        heights = np.zeros_like(x)
-        for _, (edge, height) in self._values("edge"):
-            heights += np.where(x == edge, abs(height) / 2, 0.0)
-        return heights
-
     def evaluate(self, x) -> ShapedGap:
         """Return the gap between the unloaded pieces.
 

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import contact_forms as exact
 from halfspace import press_periodic
 
-from patchfem.contact import HertzAsperities, Holder, press_patch
+from patchfem.contact import HertzAsperities, Holders, press_patch
 from patchfem.core import Compliance, Interface
 
 CARBIDE = (250e9, 0.24)  # Young's modulus [Pa] and Poisson's ratio in rig.toml
@@ -140,7 +140,7 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE) -> tuple:
     force = np.full(count, MEAN * cell)
     last = 0.0
     interface = Interface(number.astype(float), np.ones(count), 1.0)
-    holder = Holder(MEAN * cell * count)
+    holder = Holders(MEAN * cell * count)
     # secant iteration of the force on each peak; each iteration reduces the error to a third or less
     while np.abs(force - last).max() > 1e-11 * force.max():
         last = force

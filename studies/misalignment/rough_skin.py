@@ -37,7 +37,7 @@ import contact_forms as exact
 import tilted
 from asperities import MEAN
 
-from patchfem.contact import Holder, LinearAsperities, press_patch
+from patchfem.contact import Holders, LinearAsperities, press_patch
 
 SCATTERS = (0.0, 10e-9, 50e-9, 0.2e-6, 1e-6, 5e-6)
 SHAPES = ("uniform", "gaussian")
@@ -49,7 +49,7 @@ def opening(stiffness: float | None) -> float:
     pieces = tilted.pair(2).compliance
     x = pieces.interface.x
     layer = None if stiffness is None else LinearAsperities(stiffness)
-    holder = Holder(tilted.case(0.0).loading.load)
+    holder = Holders(tilted.case(0.0).loading.load)
     # at both tilts the whole length is in contact
     states = [press_patch(pieces, by * x, holder, layer) for by in (0.0, 1e-7)]
     even, turn = (state.force / pieces.interface.weight for state in states)

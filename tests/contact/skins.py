@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from patchfem.contact import ExponentialAsperities, Holder, press_patch
+from patchfem.contact import ExponentialAsperities, Holders, press_patch
 from patchfem.core import Compliance, Interface
 
 
-def press_layer(c, x, weight, gap, asperities=None, **holder):
-    """Return the state of a patch with a compliance (m, m) [m/N] that a `Holder` presses."""
+def press_layer(c, x, weight, gap, asperities=None, load=np.nan, **holder):
+    """Return the state of a patch with a compliance (m, m) [m/N] that one of the `Holders` presses."""
     pieces = Compliance(Interface(x, np.asarray(weight), 1.0), c, c)
-    return press_patch(pieces, gap, Holder(**holder), asperities)
+    return press_patch(pieces, gap, Holders(load, **holder), asperities)
 
 
 def stretch_law(law, factor: float):

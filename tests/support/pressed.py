@@ -4,14 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from patchfem.contact import Holder, press_patch
-from patchfem.contact.active_set import make_problem
-from patchfem.contact.unilateral import solve
-from patchfem.core import Compliance, Outcome
+from patchfem.contact import Holders, press_patch
+from patchfem.contact.press import PatchState
+from patchfem.core import Compliance, Interface, Outcome
 
 
 class PressedPatch(NamedTuple):
-    """Pressed patch: pressures (m,) [Pa], gap (m,) [m], motion and loads of the holder, and the check of the solution."""
+    """Pressed patch: pressures (m,) [Pa], gap (m,) [m], motion and loads of the holder."""
 
     sigma_n: np.ndarray
     gap: np.ndarray
@@ -20,46 +19,35 @@ class PressedPatch(NamedTuple):
     load: float
     moment: float
     outcome: Outcome
-    iterations: int
-    residuals: dict
 
 
-def press_by_holder(pieces: Compliance, gap, holder: Holder) -> PressedPatch:
-    """Press two bare pieces by a holder."""
+def press_by_holder(pieces: Compliance, gap, holder: Holders, rotation=0.0) -> PressedPatch:
+    """Press two bare pieces by a holder, with a rotation that the gap contains."""
     state = press_patch(pieces, gap, holder)
+    load = float(state.force.sum())
     return PressedPatch(
         state.force / pieces.interface.weight,
         state.gap,
         state.approach,
-        state.rotation,
-        state.load,
+        rotation + state.turn,
+        load,
         float(state.force @ pieces.interface.x),
-        state.outcome,
-        state.n_iterations,
-        state.residuals,
+        Outcome.DONE if load > 0 else Outcome.NO_CONTACT,
     )
 
 
-def press(pieces, gap, load, moment=None, rotation=0.0, spring=0.0) -> PressedPatch:
+def press(pieces, gap, load, moment=np.nan, rotation=0.0, spring=0.0) -> PressedPatch:
     """Press two bare pieces under a load, and a moment about a free rotation."""
-    holder = Holder(load, moment=moment, rotation=rotation, spring=spring)
-    return press_by_holder(pieces, gap, holder)
+    holder = Holders(load, moment=np.nan if moment is None else moment, spring=spring)
+    return press_by_holder(pieces, gap, holder, rotation)
 
 
 def press_to_approach(pieces, gap, approach) -> PressedPatch:
     """Press two bare pieces to a prescribed approach."""
-    return press_by_holder(pieces, gap, Holder(approach=approach))
+    return press_by_holder(pieces, gap, Holders(np.nan, approach))
 
 
-class PlainSolution(NamedTuple):
-    """Contact solution of a patch as NumPy arrays, with the number of iterations."""
-
-    force: np.ndarray
-    motion: np.ndarray
-    n_iterations: int
-
-
-def solve_forces(c, x, gap, target) -> PlainSolution:
+def solve_forces(c, x, gap, target) -> PatchState:
     """Solve the contact problem of a patch that is given as NumPy arrays.
 
     Parameters
@@ -70,13 +58,7 @@ def solve_forces(c, x, gap, target) -> PlainSolution:
         Positions [m] and gap [m].
     target : (0,), (1,) or (2,) ndarray
         Nothing with the approach contained in the gap, load [N], or load and moment [N m].
-
-    Returns
-    -------
-    PlainSolution
     """
-    touch_approach = gap.min() if target.size else 0.0
-    problem = make_problem(x, gap - touch_approach, *map(float, target))
-    solution = solve(c, problem)
-    solution.motion[:1] += touch_approach
-    return PlainSolution(solution.force, solution.motion, solution.n_iterations)
+    pieces = Compliance(Interface(x, np.ones(x.size), 1.0), c, c)
+    load, moment = np.append(target, [np.nan, np.nan])[:2]
+    return press_patch(pieces, gap, Holders(load, np.nan if target.size else 0.0, moment))

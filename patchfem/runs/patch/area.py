@@ -174,10 +174,9 @@ class AreaPatch:
     measures: Measures | None = None
     frames: Arrays = field(default_factory=dict)
 
-    # What a face has not: profiles at points of their own, averages of traces, variants of a step, meshes
+    # What a face has not: profiles at points of their own, averages of traces, meshes
     points = None
     averaging = None
-    step_variants = ()
     pair = None
 
     @property
@@ -231,8 +230,6 @@ class AreaPatch:
             load,
             float(force @ self.x),
             Outcome.DONE if load > 0 else Outcome.NO_CONTACT,
-            pressed.n_iterations,
-            MappingProxyType({"gap": pressed.residual}),
         )
 
     @property

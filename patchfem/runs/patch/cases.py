@@ -15,7 +15,7 @@ import numpy as np
 
 from ... import contact
 from ...contact.gaps import ShapeProperties
-from ...contact.press_cases import HolderCases
+from ...contact.press_cases import Holders
 from ...core import NotConverged, PatchfemError
 from ...model.gap import Gap
 from ...model.patch import PatchModel
@@ -56,13 +56,14 @@ class Cases(NamedTuple):
     - holders: loads and prescribed motions of the holders.
     - rotation (n,): rotation [rad] of the upper piece that the gap already contains.
     - amplitudes (n, p): factors of the gap shapes of `make_gap_shapes`.
-    - half_steps (n,): half the height [m] of the step of each gap; None for gaps without a step.
+    - step_changes (n, 2): changes [m] of the gap at a node on the edge of the step, which move the node from half the
+      height of the step to its higher and to its lower side; None for gaps without a step.
     """
 
-    holders: HolderCases
+    holders: Holders
     rotation: np.ndarray
     amplitudes: np.ndarray
-    half_steps: np.ndarray | None
+    step_changes: np.ndarray | None
 
     @property
     def n_cases(self) -> int:
@@ -71,20 +72,18 @@ class Cases(NamedTuple):
 
     def take(self, rows) -> "Cases":
         """Return selected cases; `rows` are indices or a mask (n,)."""
-        half_steps = self.half_steps if self.half_steps is None else self.half_steps[rows]
-        return Cases(
-            self.holders.take(rows), self.rotation[rows], self.amplitudes[rows], half_steps
-        )
+        steps = None if self.step_changes is None else self.step_changes[rows]
+        return Cases(self.holders.take(rows), self.rotation[rows], self.amplitudes[rows], steps)
 
     @property
     def variants(self) -> "list[tuple[float, Cases]]":
         """Cases with a node at the step on its higher side (-1) and on its lower side (1); [] without a step."""
-        if self.half_steps is None:
-            return []
         variants = []
-        for side in (-1.0, 1.0):
+        for side, change in zip(
+            (-1.0, 1.0), () if self.step_changes is None else self.step_changes.T
+        ):
             amplitudes = self.amplitudes.copy()
-            amplitudes[:, -1] = side * self.half_steps
+            amplitudes[:, -1] = change
             variants.append((side, self._replace(amplitudes=amplitudes)))
         return variants
 
@@ -140,7 +139,7 @@ def make_cases(patch_model: PatchModel, count: int) -> Cases:
         """Return a number, or an array (n,), as an array (n,); NaN for None."""
         return np.broadcast_to(np.nan if value is None else np.asarray(value, float), count)
 
-    holders = HolderCases(
+    holders = Holders(
         fill(loading.load),
         fill(loading.approach),
         fill(moment),
@@ -151,12 +150,14 @@ def make_cases(patch_model: PatchModel, count: int) -> Cases:
     amplitudes = [properties.amplitude(keys) for _, keys, properties in split.scaled]
     heights = [keys.height for name, keys in patch_model.gap.shapes if name == "step"]
     amplitudes += [1.0] * split.has_rest + [0.0] * bool(heights)
-    half_steps = np.abs(fill(heights[0])) / 2 if heights else None
+    step_changes = None
+    if heights:
+        step_changes = np.abs(fill(heights[0]))[:, None] * [-0.5, 0.5]
     return Cases(
         holders,
         fill(patch_model.gap.angle),
         np.array([fill(value) for value in amplitudes]).reshape(len(amplitudes), count).T,
-        half_steps,
+        step_changes,
     )
 
 

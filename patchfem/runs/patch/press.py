@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...contact.press import Holder, PatchState, press_patch
+from ...contact.press import PatchState, press_patch
 from ...contact.press_cases import press_on_table
 from ...contact.set_table import SetTable
-from ...core import Compliance, ContactState, PatchfemError, frozen_array
+from ...core import Compliance, ContactState, Outcome, PatchfemError, frozen_array
 from ...elasticity.lapack import use_one_blas_thread
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchModel
@@ -360,7 +360,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     Raises
     ------
     PatchfemError
-        If a profile does not fit the mesh.
+        If a profile does not fit the mesh, or if the contact cannot be solved.
     """
     x = pair.compliance.interface.x
     try:
@@ -370,86 +370,55 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
 
         sentences = [str(error), *advise_split(patch_model, float(np.diff(x).max()))]
         raise PatchfemError("; or ".join(sentences), error.key) from None
-    unworn_gap = heights + pair.end_gap
-    worn = np.zeros(x.size) if worn is None else worn
 
-    start = None
+    start = np.zeros((1, x.size), bool)
     if coarse is not None:
-        start = np.interp(x, coarse.x, coarse.pressed.force[0] > 0) > 0.5
+        start[0] = np.interp(x, coarse.x, coarse.pressed.force[0] > 0) > 0.5
 
     begin = process_time()
-    level = Level(patch_model, pair, np.zeros((0, x.size)))
-    gap = unworn_gap + worn
-    state = press_pieces(patch_model, pair.compliance, gap, start=start)
-    pressed = _make_single_case(level, gap, state)
-    half_steps = patch_model.gap.half_step_heights(x)
-    if half_steps.any():
-        variants = []
-        for weight, moved in _list_step_variants(pressed, unworn_gap, half_steps, worn):
-            moved_state = press_pieces(patch_model, pair.compliance, moved, start=start)
-            variants.append((weight, _make_single_case(level, moved, moved_state)))
-        pressed = replace(pressed, variants=tuple(variants))
+    worn = np.zeros(x.size) if worn is None else worn
+    pressed = _press_gap(patch_model, pair, heights + pair.end_gap, worn, start)
     times = pair.seconds | seconds | {"press": process_time() - begin}
-    return replace(_make_patch(patch_model, pressed, state, gap), notes=notes, seconds=times)
+    return replace(_make_patch(pressed), notes=notes, seconds=times)
 
 
-def _make_single_case(level: Level, gap: np.ndarray, state: PatchState) -> PressedCases:
-    """Return a solved patch as a single case.
-
-    Parameters
-    ----------
-    level : Level
-        Pieces on the mesh.
-    gap : (m,) ndarray
-        Unloaded gap [m].
-    state : PatchState
-        Solution on the nodes of the pieces.
-    """
-    layer = None
-    if level.has_layer:
-        layer = compute_layer_compliance(level, state)[None]
-    holder = HolderPositions(
-        approach=np.array([state.approach]),
-        rotation=np.array([state.rotation]),
-        turn=np.array([state.rotation - level.model.gap.angle]),
-        can_rotate=np.array([level.model.loading.moment is not None]),
-    )
-    return PressedCases(level, state.force[None], state.gap[None], gap[None], holder, layer)
-
-
-def _list_step_variants(pressed: PressedCases, unworn_gap, half_steps, worn):
-    """Return weight and gap of a patch with the node at a step on either side of the step.
-
-    A contact set ends less than half a cell beyond its last node. The solutions with and without the node at the step are
-    weighted such that the mean contact edge is at the step.
+def _press_gap(patch_model, pair: CondensedPair, gap, worn, start) -> PressedCases:
+    """Press a single case with a gap that is given at the nodes.
 
     Parameters
     ----------
-    pressed : PressedCases
-        The patch with the node at half the height of the step.
-    unworn_gap, half_steps : (m,) ndarray
-        Gap before wear, and half the height of the step at its node [m].
-    worn : (m,) ndarray
-        Worn depth [m].
+    patch_model : PatchModel
+        Model whose load and asperity layer are used.
+    pair : CondensedPair
+        Condensed pieces.
+    gap, worn : (m,) ndarray
+        Gap before wear and worn depth [m].
+    start : (1, m) bool ndarray
+        Contact set from which the search starts; an empty one is replaced by a guess.
 
-    Returns
-    -------
-    list of tuple
-        (weight (1,), gap (m,) [m]) for both sides.
+    Raises
+    ------
+    PatchfemError
+        If the contact cannot be solved.
     """
-    node = int(np.argmax(half_steps))
-    weight_shift = compute_step_weight_shift(pressed, node)
+    cases = make_cases(patch_model, 1)
+    shapes = [gap + worn]
+    if cases.step_changes is not None:
+        # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
+        # node takes the worn depth of its neighbour there, and on the lower side likewise.
+        is_step = np.isin(pair.compliance.interface.x, patch_model.gap.step_edges)
+        node = int(np.argmax(is_step))
+        neighbours = sorted((node - 1, node + 1), key=lambda neighbour: gap[neighbour])
+        changes = cases.step_changes + worn[neighbours] - worn[node]
+        cases = cases._replace(step_changes=changes)
+        shapes.append(is_step)
 
-    # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
-    # node takes the worn depth of its neighbour there, and on the lower side likewise.
-    neighbours = [node - 1, node + 1]
-    neighbours.sort(key=lambda neighbour: unworn_gap[neighbour])
-    variants = []
-    for side, neighbour in zip((-1, 1), neighbours):
-        moved = unworn_gap + side * half_steps + worn
-        moved[node] += worn[neighbour] - worn[node]
-        variants.append((0.5 - side * weight_shift, moved))
-    return variants
+    level = Level(patch_model, pair, np.array(shapes, float))
+    cases = cases._replace(amplitudes=np.eye(1, len(shapes)))
+    pressed, errors = press_on_level(level, cases, start)
+    for error in errors.values():
+        raise error
+    return pressed
 
 
 def compute_step_weight_shift(pressed: PressedCases, node: int) -> np.ndarray:
@@ -464,35 +433,22 @@ def compute_step_weight_shift(pressed: PressedCases, node: int) -> np.ndarray:
     return shift * (1 - pressed.layer_fraction[:, node])
 
 
-def _make_patch(patch_model, pressed: PressedCases, state: PatchState, gap: np.ndarray) -> Patch:
-    """Return the Patch of a single case.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Model that was solved.
-    pressed : PressedCases
-        The patch as a single case.
-    state : PatchState
-        The same solution with its residuals.
-    gap : (m,) ndarray
-        Unloaded gap [m].
-    """
+def _make_patch(pressed: PressedCases) -> Patch:
+    """Return the Patch of a single case."""
+    patch_model = pressed.level.model
     pair = pressed.level.pair
     loading = patch_model.loading
     interface = patch_model.interface
     skin = interface.skin
-
+    load = float(pressed.load[0])
     contact_state = ContactState(
         frozen_array(pressed.contact_pressure[0]),
-        state.gap,
-        state.approach,
-        state.rotation,
-        state.load,
+        frozen_array(pressed.gap[0]),
+        float(pressed.holder.approach[0]),
+        float(pressed.holder.rotation[0]),
+        load,
         float(pressed.moment[0]),
-        state.outcome,
-        state.n_iterations,
-        state.residuals,
+        Outcome.DONE if load > 0 else Outcome.NO_CONTACT,
     )
 
     # The layer can be part of the compliance. Without a tangential ratio it is rigid in shear.
@@ -517,7 +473,7 @@ def _make_patch(patch_model, pressed: PressedCases, state: PatchState, gap: np.n
         pieces,
         contact_state,
         slip_compliance=slip_compliance,
-        unloaded_gap=frozen_array(gap),
+        unloaded_gap=frozen_array(pressed.unloaded_gap[0]),
         averaging=patch_model.gap.averaging_length(pieces.interface.x, contact_state.sigma_n > 0),
         pressed=pressed,
     )
@@ -563,7 +519,7 @@ def press_on_level(
         pressed, errors = _press_gaps(level, cases, start)
         # A step between two nodes, as on a mesh that the scene prescribes, has no variants
         variants = []
-        has_step_node = cases.half_steps is not None and level.shapes[-1].any()
+        has_step_node = cases.step_changes is not None and level.shapes[-1].any()
         for side, moved in cases.variants if has_step_node else ():
             node = int(np.argmax(level.shapes[-1]))
             part, more_errors = _press_gaps(level, moved, pressed.active)
@@ -579,6 +535,7 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
     The parameters and results are those of `press_on_level`.
     """
     holders = cases.holders
+    compliance = level.pair.compliance
     unloaded_gap = cases.amplitudes @ level.shapes
     force = np.zeros(unloaded_gap.shape)
     gap = unloaded_gap.copy()
@@ -593,7 +550,8 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
     if not level.is_smooth:
         table = level.tables[0]
         sets = press_on_table(table, holders, cases.amplitudes, start)
-        solved = np.flatnonzero(sets.is_solved)
+        is_solved = sets.is_solved & holders.are_computable(unloaded_gap.min(axis=1))
+        solved = np.flatnonzero(is_solved)
         slots = sets.slot[solved]
         unknown = table.combine(slots, sets.closing[solved])
         active = table.active[slots]
@@ -601,22 +559,20 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
         gap[solved] = np.where(active, 0.0, np.maximum(unknown, 0.0))
         approach[solved] = sets.closing[solved, 0]
         turn[solved] = -sets.closing[solved, 1]
-        alone = np.flatnonzero(~sets.is_solved)
+        alone = np.flatnonzero(~is_solved)
 
     errors = {}
     for case in alone:
         try:
-            holder = _make_holder(cases, case)
-            state = press_pieces(
-                level.model, level.pair.compliance, unloaded_gap[case], holder=holder
-            )
+            law = make_skin_law(level.model) if level.has_layer else None
+            state = press_patch(compliance, unloaded_gap[case], holders.take(case), law)
         except PatchfemError as error:
             errors[int(case)] = error
             continue
         force[case] = state.force
         gap[case] = state.gap
         approach[case] = state.approach
-        turn[case] = state.rotation - cases.rotation[case]
+        turn[case] = state.turn
         if layer is not None:
             layer[case] = compute_layer_compliance(level, state)
 
@@ -637,56 +593,17 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
     """
     pieces = pair.compliance
     gap = patch_model.gap.evaluate(pieces.interface.x).heights + pair.end_gap
+    holder = make_cases(patch_model, 1).holders.take(0)
+    law = None if patch_model.interface.skin is None else make_skin_law(patch_model)
 
     def compute_forces(worn, softening) -> np.ndarray:
         """Return the contact forces (m,) [N] for a worn depth (m,) [m] and a softening (m,) [m/N]."""
         softened = pieces
         if softening.any():
             softened = replace(pieces, normal=pieces.normal + np.diag(softening))
-        return press_pieces(patch_model, softened, gap + worn).force
+        return press_patch(softened, gap + worn, holder, law).force
 
     return compute_forces
-
-
-def press_pieces(
-    patch_model, pieces: Compliance, gap: np.ndarray, start=None, holder: Holder | None = None
-) -> PatchState:
-    """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Model whose asperity layer, load and holder are used.
-    pieces : Compliance
-        Compliance of the pieces without asperity layer.
-    gap : (m,) ndarray
-        Unloaded gap [m].
-    start : (m,) bool ndarray, optional
-        Nodes in contact of a similar solution, from which the search starts.
-    holder : Holder, optional
-        Load and prescribed motions in place of those of the model.
-
-    Returns
-    -------
-    PatchState
-    """
-    law = None if patch_model.interface.skin is None else make_skin_law(patch_model)
-    holder = holder or _make_holder(make_cases(patch_model, 1), 0)
-    return press_patch(pieces, gap, holder, law, start)
-
-
-def _make_holder(cases: Cases, case: int) -> Holder:
-    """Return load and prescribed motions of one case."""
-    numbers = np.array(cases.holders)[:, case].tolist()
-    load, approach, moment, spring = (None if np.isnan(one) else one for one in numbers)
-    # Under a prescribed approach, at which no piece rotates, the load follows from the solution.
-    return Holder(
-        load=load,
-        approach=approach,
-        moment=moment,
-        spring=spring,
-        rotation=float(cases.rotation[case]),
-    )
 
 
 def compute_layer_compliance(level: Level, state: PatchState) -> np.ndarray:
