@@ -12,8 +12,7 @@ interface under a constant load. Optional features are:
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
 - `harmonic`: steady motions over one period;
-- `march`: time steps with return maps (`points.return_maps_kernels`);
-- `grooves`: grooves whose flanks the surfaces climb;
+- `march`: time steps with return maps (`points.return_maps_kernels`).
 
 Traits of laws:
 
@@ -207,21 +206,21 @@ EFFECTS = {
         "laws.coulomb",
         "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
         ("", "kinetic"),
-        "shear joints exact pieces grooves march",
+        "shear joints exact pieces march",
         "set-valued timeless memoryless",
     ),
     "friction.law=tanh": _make_law(
         "laws.tanh",
         "F = mu N tanh(v/v_0) (2.4)",
         ("reference_speed", ""),
-        "joints harmonic grooves march",
+        "joints harmonic march",
         "memoryless creeps",
     ),
     "friction.law=elastic-plastic": _make_law(
         "laws.elastic_plastic",
         "F' = k v, |F| <= mu N (3.12, corrected for reversals), k = stiffness or mu N/bond_length",
         ("bond_length|stiffness", ""),
-        "shear joints harmonic pieces grooves march",
+        "shear joints harmonic pieces march",
         "timeless",
     ),
     "friction.law=nonlocal": _make_law(
@@ -232,7 +231,7 @@ EFFECTS = {
             "kinetic reading order rest_growth slip_growth rest_speed "
             "initial_bonds spread temperature",
         ),
-        "shear joints harmonic grooves march",
+        "shear joints harmonic march",
         "bonds",
     ),
     "friction.law=convolution": _make_law(
@@ -513,14 +512,12 @@ def suggest_laws(feature: str, other_features: str = "", friction=None) -> str:
 
 
 REMEDIES = {  # advice by name, for two effects that cannot be combined
-    "recursion": 'use reading = "stretch" with order = 1',
     "kinetic": "leave out the key kinetic",
     "shapes": "put the shapes on the upper piece",
     "either": "leave one of the two out",
     "out": "leave out this entry",
     "linear": "use 'linear'",
     "march": "use 'march'",
-    "stiff": "use law 'elastic-plastic' with a short bond_length, which approximates Coulomb friction",
 }
 
 

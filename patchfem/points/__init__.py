@@ -34,7 +34,6 @@ PUBLIC = {
         "make_bond_contact",
         "make_contact",
         "make_cubic_spring",
-        "make_flank_contact",
         "make_interlocking_spring",
         "make_pressed_contact",
     ),

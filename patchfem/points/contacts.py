@@ -240,34 +240,3 @@ def make_pressed_contact(
     limit = (law.static or 1.0) * max(float(loads.sum()), 1e-9)
     point_sets = [PointSet(points, row, nodes, shear)]
     return Contact(point_sets, limit, length, bond_sum=bond_sum, preload=float(loads.sum()), **load)
-
-
-def make_flank_contact(law, grooves: Grooves, load: float, row, shear=None, shares=None) -> Contact:
-    """Return the points of an interface that climbs the flanks of grooves.
-
-    Parameters
-    ----------
-    law : Bonds, or keys `law`, `static` and `bond_length` of a table [friction]
-        Law of the points.
-    grooves : Grooves
-        Geometry of the grooves and mass that they lift.
-    load : float
-        Vertical load [N].
-    row : (n,) array
-        Slide per modal coordinate.
-    shear : ShearModes, optional
-        Shear of the pieces.
-    shares : (m,) array, optional
-        Fractions of the load on the points; default: a single point.
-    """
-    normal = load * float(np.hypot(1.0, grooves.slope(0.0)))
-    shares = np.ones(1) if shares is None else np.asarray(shares, float)
-    if isinstance(law, Bonds):
-        length = law.length
-        points = make_bonds(law, normal * shares)
-    else:
-        length = law.bond_length
-        points = make_jenkins(law.static, length, normal * shares)
-    limit = grooves.max_force(load, law.static)
-    point_sets = [PointSet(points, row, None, shear)]
-    return Contact(point_sets, limit, length, preload=load, grooves=grooves)

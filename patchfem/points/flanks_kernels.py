@@ -78,7 +78,7 @@ def find_stiffness(flank, q, dq, dt):
 
 
 @njit(**NJIT_CALL)
-def add_climb(flank, moves, dq, dt):
+def add_climb(flank, moves, dq, dt, end):
     """Write force and slope of the port that climbs, from those of its points along the flank.
 
     F = V t + r f and dF/dq = K + r^2 df/ds, with the ratio r of path to displacement.
@@ -86,15 +86,17 @@ def add_climb(flank, moves, dq, dt):
     Parameters
     ----------
     flank : (k,) array
-        Numbers of the flanks, in the rows of `march_rows.Flank`; TRIAL_FORCE becomes the force along the flank.
+        Numbers of the flanks, in the rows of `march_rows.Flank`; TRIAL_FORCE becomes `end`.
     moves : (k, p) array
         Values of the ports, in the rows of `march_rows.Port`.
     dq : float
         Increment of the slide [m].
     dt : float
         Duration of the step [s].
+    end : float
+        Force along the flank at the end of the step [N].
     """
-    flank[Flank.TRIAL_FORCE] = moves[Port.SUM, 0]
+    flank[Flank.TRIAL_FORCE] = end
     ratio = flank[Flank.RATIO]
     stiffness = find_stiffness(flank, moves[Port.SLIDE, 0], dq, dt)
     moves[Port.SUM, 0] = (
@@ -104,27 +106,11 @@ def add_climb(flank, moves, dq, dt):
 
 
 @njit(**NJIT_CALL)
-def find_normal(flank, q, friction, bound):
-    """Return the normal force [N] at a slide q, for a mean friction force of the step; `bound` is mu [1].
-
-    The friction at the end is extrapolated from that at the start and the mean, and does not exceed mu times the normal
-    force.
-
-    Parameters
-    ----------
-    flank : (k,) array
-        Numbers of the flanks, in the rows of `march_rows.Flank`.
-    q : float
-        Slide [m].
-    friction : float
-        Mean friction force of the step [N].
-    bound : float
-        Coefficient of friction mu.
-    """
+def find_normal(flank, q):
+    """Return the normal force [N] at a slide q [m] under the vertical force and the friction of the trial step."""
     t = find_slope(flank, q)
-    limit = bound * flank[Flank.NORMAL]
-    after = min(max(2 * friction - flank[Flank.FORCE], -limit), limit)
-    return max(max(flank[Flank.TRIAL_VERTICAL], 0.0) * sqrt(1 + t * t) + after * t, 0.0)
+    vertical = max(flank[Flank.TRIAL_VERTICAL], 0.0)
+    return max(vertical * sqrt(1 + t * t) + flank[Flank.TRIAL_FORCE] * t, 0.0)
 
 
 @njit(**NJIT_CALL)

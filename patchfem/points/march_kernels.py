@@ -188,7 +188,10 @@ def write_forces(system, level, dt):
         moves[Port.BY_VELOCITY, p] = values[Point.BY_VELOCITY, first:end].sum()
 
     if flank.size:
-        flanks.add_climb(flank, moves, moves[Port.INCREMENT, 0], dt)
+        # The force at the end is extrapolated from that at the start and the mean, up to the friction limit.
+        limit = points.numbers[1, 0] * flank[Flank.NORMAL]
+        end = min(max(2 * moves[Port.SUM, 0] - flank[Flank.FORCE], -limit), limit)
+        flanks.add_climb(flank, moves, moves[Port.INCREMENT, 0], dt, end)
         moves[Port.BY_VELOCITY, 0] *= flank[Flank.RATIO]
 
     if system.structure.path.size:
@@ -515,7 +518,7 @@ def find_loads(system, row, fraction, is_solved):
         if resultant < 0:
             return -1.0
     else:
-        resultant = find_resultant(system, row, fraction, points.numbers[1, 0], is_solved)
+        resultant = find_resultant(system, row, fraction, is_solved)
 
     change = 0.0
     total = TINY_LOAD

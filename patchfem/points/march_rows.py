@@ -110,7 +110,7 @@ class Flank(IntEnum):
     - RISE_SPEED [m/s], VERTICAL [N], FORCE [N], NORMAL [N]: vertical speed of the lifted mass, mean vertical force of
       the last step, force along the flank and normal force at its end
     - SLOPE, RATIO: mean height and path along the flank per increment of a trial step [1]
-    - TRIAL_VERTICAL, TRIAL_FORCE: mean vertical force and mean force along the flank of a trial step [N]
+    - TRIAL_VERTICAL, TRIAL_FORCE: mean vertical force of a trial step, and force along the flank at its end [N]
     - HAS_LIFTED: 1 after the vertical force has vanished
     """
 

@@ -297,7 +297,7 @@ def advance_shear(points, dt):
 
 
 @njit(**NJIT_CALL)
-def find_resultant(system, row, fraction, friction, is_solved):
+def find_resultant(system, row, fraction, is_solved):
     """Return the load [N] at the end of a step that follows from a flank or from a prescribed history; 0 without one.
 
     Parameters
@@ -308,8 +308,6 @@ def find_resultant(system, row, fraction, friction, is_solved):
         Number of the whole step.
     fraction : float
         Time at the end of the step, as a fraction of the whole step.
-    friction : float
-        Coefficient of friction on the flank.
     is_solved : bool
         Whether the motion of the step is known.
     """
@@ -319,8 +317,7 @@ def find_resultant(system, row, fraction, friction, is_solved):
     if flank.size:
         if is_solved:
             q = moves[Port.SLIDE, 0] + moves[Port.INCREMENT, 0]
-            force = flank[Flank.TRIAL_FORCE]
-            flank[Flank.NORMAL] = flanks.find_normal(flank, q, force, friction)
+            flank[Flank.NORMAL] = flanks.find_normal(flank, q)
         return flank[Flank.NORMAL]
     return loads[row] + fraction * (loads[row + 1] - loads[row]) if loads.size else 0.0
 

@@ -54,6 +54,9 @@ from .laws_kernels import slide_points
 from .step_rows_kernels import VECTOR, WIDTH, Law, Step, Value
 
 MAX_NEWTON_ITERATIONS = 60  # Newton iterations of a step
+MAX_LOAD_ITERATIONS = (
+    30  # trials of the normal force on a flank, whose change falls by mu times the slope in each
+)
 MAX_CUTS = 8  # trials of a line search, each with a third of the step before
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
 STALLED = 1e3  # largest residual of such a step relative to RESIDUAL
@@ -225,7 +228,11 @@ def write_forces(system, level, step):
         moves[Port.BY_VELOCITY, p] = by_velocity
 
     if flank.size:
-        flanks.add_climb(flank, moves, moves[Port.MOVE, 0], step.duration)
+        end = 0.0
+        for block in range(points.first[1]):
+            for j in range(points.count[block]):
+                end += points.values[block, Value.END + j]
+        flanks.add_climb(flank, moves, moves[Port.MOVE, 0], step.duration, end)
         moves[Port.BY_VELOCITY, 0] *= flank[Flank.RATIO] ** 2
     if system.structure.path.size:
         moves[Port.FORCE, 0] = moves[Port.SUM, 0]
@@ -439,6 +446,35 @@ def write_products(points, p, matrix, n_ports, step):
 
 
 @njit(**NJIT_CALL)
+def write_balanced_forces(system, level, step):
+    """Compute increments and forces as `write_forces`, with the normal force on a flank that belongs to the friction.
+
+    Newton's method knows the forces under a given load only. On a steep flank the load follows the friction of all points.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    step : Step
+        Duration and formula of the velocity.
+
+    Returns
+    -------
+    float
+        Change of the loads since the trial before, relative to the resultant; -1 without a contact set.
+    """
+    change = write_forces(system, level, step)
+    if system.flank.size:
+        for _ in range(MAX_LOAD_ITERATIONS):
+            if change <= LOAD_RESIDUAL:
+                break
+            change = write_forces(system, level, step)
+    return change
+
+
+@njit(**NJIT_CALL)
 def solve_forces(system, level, step):
     """Solve the port forces `Port.FORCE` and shear increments `Shear.TRIAL` by Newton's method; return whether it did.
 
@@ -454,7 +490,7 @@ def solve_forces(system, level, step):
         Duration and formula of the velocity.
     """
     ports = system.ports
-    change = write_forces(system, level, step)
+    change = write_balanced_forces(system, level, step)
     if change < 0:
         return False
     residual = max(write_residual(system, level), change / LOAD_RESIDUAL)
@@ -476,7 +512,7 @@ def solve_forces(system, level, step):
         before = residual
         for _ in range(MAX_CUTS):
             subtract_step(system, fraction)
-            change = write_forces(system, level, step)
+            change = write_balanced_forces(system, level, step)
             if change < 0:
                 return False
             residual = max(write_residual(system, level), change / LOAD_RESIDUAL)
@@ -512,7 +548,7 @@ def find_loads(system, row, fraction, is_solved):
         if resultant < 0:
             return -1.0
     else:
-        resultant = find_resultant(system, row, fraction, points.numbers[0, 0], is_solved)
+        resultant = find_resultant(system, row, fraction, is_solved)
 
     change = 0.0
     total = TINY_LOAD

@@ -53,12 +53,14 @@ LAWS = {
     "lugre": f'stiffness = "{STIFFNESS} N/m"\nstribeck_speed = "10 mm/s"\nkinetic = 0.25\n'
     'micro_damping = "50 N s/m"\nviscous = "20 N s/m"\n',
     "dahl": f'stiffness = "{STIFFNESS} N/m"\nstribeck_speed = "1 m/s"\n',
+    # friction that exceeds static times the load
+    "viscous": f'stiffness = "{STIFFNESS} N/m"\nstribeck_speed = "1 m/s"\nviscous = "2000 N s/m"\n',
 }
 
 
 def write_law(name: str) -> str:
     """Return the table of a friction law."""
-    law = {"dahl": "lugre", "stiffness": "elastic-plastic"}.get(name, name)
+    law = {"dahl": "lugre", "viscous": "lugre", "stiffness": "elastic-plastic"}.get(name, name)
     return f'[friction]\nlaw = "{law}"\nstatic = {STATIC}\n{LAWS[name]}'
 
 
@@ -199,12 +201,12 @@ SUPPORTED = {
     "grooves": (
         POINT + GROOVES.format("normal") + "{}" + RIG,
         2000,
-        ("tanh", "elastic-plastic", "iwan", "bouc-wen"),
+        ("tanh", "elastic-plastic", "iwan", "bouc-wen", "viscous"),
     ),
     "grooves and cubic spring": (
         POINT + GROOVES.format("normal") + "{}" + RIG.replace("[drive]", CUBIC),
         2000,
-        ("coulomb", "tanh"),
+        ("coulomb", "tanh", "elastic-plastic", "bouc-wen"),
     ),
     "grooves and load": (
         POINT + AMPLITUDE_OF_LOAD + GROOVES.format("normal") + "{}" + RIG,
@@ -219,12 +221,23 @@ SUPPORTED = {
         + "{}"
         + BENCH,
         400,
-        ("elastic-plastic", "nonlocal"),
+        ("coulomb", "elastic-plastic", "nonlocal", "tanh"),
     ),
     "lower": (
         PATCH.replace('"8 m"', '"8 m"\non = "lower"') + "{}" + RIG,
         400,
-        ("nonlocal",),
+        ("nonlocal", "tanh", "iwan"),
+    ),
+    "bench": (
+        POINT + AMPLITUDE_OF_LOAD + "{}" + BENCH,
+        2000,
+        ("stiffness", "iwan", "bouc-wen", "lugre"),
+    ),
+    "bench with shear": (PATCH + SHEAR + "{}" + BENCH, 400, ("tanh", "iwan", "bouc-wen", "lugre")),
+    "bench with lower": (
+        PATCH.replace('"8 m"', '"8 m"\non = "lower"') + SHEAR + "{}" + BENCH,
+        400,
+        ("coulomb", "elastic-plastic", "bouc-wen"),
     ),
 }
 CASES = [(name, law) for name, row in SUPPORTED.items() for law in row[2]]

@@ -16,7 +16,6 @@ from scene_texts import (
     POINT,
     RIG,
     SHEAR,
-    SLIDE,
     STRUCTURE,
     make_friction_table,
 )
@@ -154,26 +153,11 @@ REFUSALS = [
     ),
     (BENCH, GROOVES + WEAR, r"wear: .*with \[normal.grooves\]; a \[normal\] contact has no area"),
     (
-        COULOMB_RIG,
-        GROOVES + "friction.law=convolution; friction.bond_length=1 um",
-        r"friction.law: .*with \[normal.grooves\] is not supported yet; use law 'coulomb'",
-    ),
-    (
-        BONDED_RIG,
-        GROOVES + "accuracy.quadrature=direct",
-        r"accuracy.quadrature: 'direct' with \[normal.grooves\]",
-    ),
-    (
         BLOCK + COULOMB + STRUCTURE,
         CONTACT_GROOVES + "structure.mode.axial.normal=0.1",
         r"structure\.mode\.\S+: not supported yet with \[contact\.grooves\]",
     ),
     (BLOCK, CONTACT_GROOVES, r"contact\.grooves: .*needs a sliding motion"),
-    (
-        BLOCK + COULOMB + SLIDE,
-        CONTACT_GROOVES + "contact.holder.tangential_stiffness=1e7 N/m",
-        r"contact\.holder\.tangential_stiffness: not supported yet with \[contact\.grooves\] and law 'coulomb'",
-    ),
     # ---- holders, faces and normal motion
     (
         RIG,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ... import friction
 from ...core import MIN_LOAD
-from ...effects import law_has_trait, law_takes_stiffness_or_length
+from ...effects import law_has_trait, law_takes_stiffness_or_length, needs_bond_list
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED
 from ...points.march_rows import LOWER
@@ -70,6 +70,21 @@ class Surface(NamedTuple):
     lower: LowerPlaces | None = None
 
 
+def sums_over_lists(model) -> bool:
+    """Return whether the bonds of a model are summed one by one.
+
+    A list keeps the load under which a bond formed, but the bonds of order 1 break as the load falls. So a named sum does
+    not replace their recursion under a load that changes.
+    """
+    keys = model.friction
+    if not law_has_trait(keys.law, "bonds") or needs_bond_list(keys):
+        return needs_bond_list(keys)
+    changes = model.load_varies or model.grooves is not None
+    if model.rig is not None:
+        changes = changes or model.rig.friction.load_varies
+    return not changes and model.accuracy.quadrature not in ("auto", "recursion")
+
+
 def needs_time_steps(model, *, is_soft: bool, varies: bool) -> bool:
     """Return whether only the march of `time_steps` has the law of an interface beside its other effects.
 
@@ -86,19 +101,22 @@ def needs_time_steps(model, *, is_soft: bool, varies: bool) -> bool:
         Whether the load changes in time, or by heave and pitch.
     """
     keys = model.friction
-    has_grooves = model.grooves is not None
+    if sums_over_lists(model):
+        return False
+    if model.grooves is not None:
+        return True
     if model.side == "lower" and not law_has_trait(keys.law, "bonds"):
         return True
     if keys.law in MEMORY_LAWS:
-        return varies or is_soft or has_grooves
+        return varies or is_soft
     if law_has_trait(keys.law, "averaged"):
         return varies
     if law_has_trait(keys.law, "set-valued"):
         return varies and is_soft
     if law_has_trait(keys.law, "memoryless"):
-        return is_soft or has_grooves
+        return is_soft
     is_fixed = keys.stiffness is not None and law_takes_stiffness_or_length(keys.law)
-    return is_fixed and (varies or has_grooves)
+    return is_fixed and varies
 
 
 def make_contact(model, patch, *, has_half_cells: bool = False) -> Contact:
@@ -159,11 +177,7 @@ def find_load_fields(model, patch) -> dict:
     """Return the fields of a Contact that describe a load that follows from time, the place, or the flank of a groove."""
     if model.grooves is not None:
         load = model.point.load if patch is None else float(patch.pressure.load)
-        grooves = model.grooves
-        if model.rig is None:
-            # A prescribed slide has no inertia.
-            grooves = replace(grooves, lifted_mass=0.0)
-        return {"grooves": grooves, "preload": load}
+        return {"grooves": shear.find_climbed_grooves(model), "preload": load}
     if model.load_varies:
         preload = float(model.point.evaluate(np.zeros(1))[0])
         return {"load": model.point.evaluate, "preload": preload}

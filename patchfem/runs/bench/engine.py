@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Missing
-from ...effects import law_has_trait, needs_bond_list
+from ...effects import law_has_trait
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds.parameters import MAX_LIST_SECONDS
 from . import contact_points
@@ -66,12 +66,10 @@ def choose_bench_engine(
         return BenchEngine(CLOSED_FORM)
     if uses_contact_points(model):
         return BenchEngine(CONTACT_POINTS)
-    if model.partial_slip and (has_bonds or model.grooves is not None):
-        is_summed = needs_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
-        if model.grooves is not None or not is_summed:
-            return BenchEngine("bond points")
     if not has_bonds:
         return BenchEngine(PARALLEL_ELEMENTS)
+    if model.partial_slip and not contact_points.sums_over_lists(model):
+        return BenchEngine("bond points")
 
     choice = choice or choose_bond_summation(model, slide)
     if choice.engine == "recursion":
@@ -123,18 +121,16 @@ def choose_bond_summation(model, slide) -> "bond_engines.EngineChoice":
 def find_requested_engine(model) -> str:
     """Return the engine of bond summation that the scene requests, or "auto".
 
-    "auto" and "recursion" become "merged" if every point has its own list and the bonds keep the
-    pressure at which they formed. Each step then adds a strip to every list.
+    A list of each point becomes "merged", if the scene does not name a sum and the bonds keep the pressure at which they
+    formed: each step adds a strip to every list.
     """
-    scene_engine = model.accuracy.quadrature
-    f = model.friction
-    rig = model.rig is not None
-    has_separate_lists = (model.side == "lower" and (model.partial_slip or needs_bond_list(f))) or (
-        rig and model.load_varies and needs_bond_list(f)
-    )
-    return (
-        "merged" if has_separate_lists and scene_engine in ("auto", "recursion") else scene_engine
-    )
+    if not contact_points.sums_over_lists(model):
+        return "auto"
+    requested = model.accuracy.quadrature
+    if requested not in ("auto", "recursion"):
+        return requested
+    has_separate_lists = model.side == "lower" or (model.rig is not None and model.load_varies)
+    return "merged" if has_separate_lists else "auto"
 
 
 def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | None":
@@ -219,7 +215,6 @@ def uses_parallel_elements(model) -> bool:
     """Return whether the partial slip of a bench run is computed by parallel elements."""
     return (
         model.partial_slip
-        and model.grooves is None
         and not law_has_trait(model.friction.law, "bonds")
         and not uses_contact_points(model)
     )

@@ -1,7 +1,7 @@
 """Contact points of one interface, for the path of a bench and for the march of a rig.
 
-In: a model and its Patch. Out: a `points.contacts.Contact` of a law with memory along the motion: bonds, grooves, or a load
-that changes (`make_points`); and the fields of grooves. Pieces that deform in shear are replaced by shear modes.
+In: a model and its Patch. Out: a `points.contacts.Contact` of a law with memory along the motion: bonds, or a load
+that changes (`make_points`); and the fields of points. Pieces that deform in shear are replaced by shear modes.
 """
 
 from dataclasses import replace
@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import contact_sets
-from ...contact.stiffness import tangential_stiffness
 from ...effects import law_has_trait
 from ...points import contacts, slides
 from ...slip import shear_modes
@@ -19,10 +18,7 @@ from ..patch import area_slip, store
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
 # pressure.
 UNLOADED_NODE_PRESSURE_FRACTION = 1e-3
-# Bond length of the points that represent Coulomb's law over grooves, relative to the tolerance times the slide at gross
-# slip; on flat ground the force is then wrong by at most .17 of the tolerance, relative to the friction limit.
-COULOMB_BOND_LENGTH_RATIO = 0.1
-# Smallest bond length for the choice of shear modes over grooves, relative to the slide at gross slip.
+# Bond length for the choice of the shear modes of rigid friction, relative to the slide at gross slip.
 MIN_BOND_LENGTH_RATIO = 1e-3
 # Pressure that is added to each node in the weights of shear modes under a changing load, relative to the mean pressure.
 ADDED_WEIGHT_PRESSURE_FRACTION = 1.0
@@ -38,7 +34,7 @@ SHEAR_MODES_ERROR_RATIO = 0.1
 
 
 def make_points(model, patch, row, choice=None, n_modes: int | None = None) -> "contacts.Contact":
-    """Return the contact points of bonds, on grooves, or under a load that changes.
+    """Return the contact points of bonds, or under a load that changes.
 
     Under a nonlocal law with [contact.shear], the nodes of the patch with pressure become points of bonds with the
     friction limits mu sigma_n area [N]. They are coupled by shear modes of the pieces, as many as keep the error of the
@@ -59,8 +55,6 @@ def make_points(model, patch, row, choice=None, n_modes: int | None = None) -> "
     """
     n_modes = n_modes or model.accuracy.shear_modes
     load = patch.pressure.load if patch is not None else model.point.load
-    if model.grooves is not None:
-        return make_flank_contact(model, load, patch, n_modes)
     law = model.friction
     bond_sum = None
     if law_has_trait(law.law, "bonds"):
@@ -82,7 +76,32 @@ def make_points(model, patch, row, choice=None, n_modes: int | None = None) -> "
     force = load
     if modes is not None:
         force = (patch.pressure.sigma_n * patch.pieces.interface.weight)[modes.points]
-    return contacts.make_bond_contact(law, force, row, modes, bond_sum)
+    if model.grooves is None:
+        return contacts.make_bond_contact(law, force, row, modes, bond_sum)
+
+    # The points carry the normal force on the flank.
+    normal = force * float(np.hypot(1.0, model.grooves.slope(0.0)))
+    contact = contacts.make_bond_contact(law, normal, row, modes, bond_sum)
+    limit = model.grooves.max_force(load, law.static)
+    return replace(contact, limit=limit, preload=load, grooves=find_climbed_grooves(model))
+
+
+def find_climbed_grooves(model):
+    """Return the grooves that the upper piece climbs.
+
+    Raises
+    ------
+    PatchfemError
+        If the mass that they lift in a rig makes the acceleration undefined.
+    """
+    if model.rig is None:
+        # A prescribed slide has no inertia.
+        return replace(model.grooves, lifted_mass=0.0)
+    # The lifted mass is compared to the modal mass at the interface, m / (s . s).
+    modes = model.rig.modes
+    mass = modes.mass / float(modes.slide @ modes.slide)
+    model.grooves.check_lifted_mass(model.friction.static, mass)
+    return model.grooves
 
 
 def _make_moving_contact(model, patch, law, row, bond_sum, n_modes) -> "contacts.Contact":
@@ -211,8 +230,9 @@ def choose_modes(
     compliance = patch.slip_compliance
     length = softness.length
     if not length and n_modes is None:
-        # Rigid friction is replaced by a short length, as its number of modes would have no bound.
-        length = MIN_BOND_LENGTH_RATIO * find_gross_slip(patch, limit)
+        # Rigid friction is replaced by a length far below the mean displacement under the friction limits of all nodes, as
+        # its number of modes would have no bound.
+        length = MIN_BOND_LENGTH_RATIO * float(limit @ (compliance @ limit) / limit.sum())
     bound = SHEAR_MODES_ERROR_RATIO * tolerance
     if patch.model.area is not None:
         count = n_modes or area_slip.N_AREA_MODES
@@ -234,13 +254,6 @@ def choose_modes(
     )
 
 
-def find_gross_slip(patch, limit) -> float:
-    """Return the slide [m] at which all nodes slip on elastic pieces: the friction limits (m,) [N] over their stiffness."""
-    if patch.model.area is not None:
-        return limit.sum() / area_slip.compute_stick_stiffness(patch, 1.0, 0.0)
-    return limit.sum() / tangential_stiffness(patch.slip_compliance, limit > 0)
-
-
 def find_own_compliance(patch) -> np.ndarray:
     """Return the shear displacement (m,) [m/N] of each node of a patch under a force of its own."""
     compliance = patch.slip_compliance
@@ -250,66 +263,6 @@ def find_own_compliance(patch) -> np.ndarray:
     if compliance.cells is not None:
         own += compliance.cells.self_compliance / compliance.weight
     return np.full(patch.x.size, compliance.factor * own)
-
-
-def make_flank_contact(model, load: float, patch=None, n_modes: int | None = None):
-    """Return the points of a law with memory on the flanks of grooves.
-
-    A bench has no lifted mass. Coulomb's law at points of pieces that deform in shear is an elastic-plastic law of a
-    short length.
-
-    Parameters
-    ----------
-    model : Model
-        Model of a bench or a rig with grooves.
-    load : float
-        Normal load [N].
-    patch : Patch, optional
-        Patch whose pieces deform in shear.
-    n_modes : int, optional
-        Number of shear modes of the pieces; default: by the tolerance.
-
-    Returns
-    -------
-    points.contacts.Contact
-    """
-    f = model.friction
-    law = model.bonds if law_has_trait(f.law, "bonds") else f
-
-    # On a rig the lifted mass is compared to the modal mass at the interface, m / (s . s).
-    grooves = model.grooves
-    row = np.zeros(0)
-    if model.rig is None:
-        grooves = replace(grooves, lifted_mass=0.0)
-    else:
-        modes = model.rig.modes
-        row = modes.slide
-        grooves.check_lifted_mass(f.static, modes.mass / float(modes.slide @ modes.slide))
-
-    if not model.partial_slip:
-        return contacts.make_flank_contact(law, grooves, load, row)
-
-    # Points on pieces that deform in shear: limit mu N of each node, and the length over which it
-    # is reached.
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    limit = f.static * force
-    tolerance = model.accuracy.tolerance
-
-    # Coulomb's law yields at once; a length far below the slide at gross slip, sum(limit) / k_t,
-    # replaces the jump.
-    length = _find_yield_length(law)
-    if not length:
-        gross_slip_slide = find_gross_slip(patch, limit)
-        ratio = COULOMB_BOND_LENGTH_RATIO * tolerance
-        law = f.model_copy(update={"bond_length": ratio * gross_slip_slide})
-        length = max(ratio, MIN_BOND_LENGTH_RATIO) * gross_slip_slide
-
-    softness = Softness(length, find_steepest_fall(law))
-    reduced = choose_modes(patch, limit, softness, n_modes, tolerance)
-
-    # The load of the grooves is distributed over the points as the pressure is.
-    shares = force[reduced.points] / force.sum()
-    return contacts.make_flank_contact(law, grooves, load, row, reduced, shares)
 
 
 def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndarray]:

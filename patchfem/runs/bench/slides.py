@@ -377,8 +377,7 @@ def _make_contact(task: SlideTask):
         )
         return contact, None
     row = np.zeros(0)
-    has_points = model.grooves is not None or model.load_varies
-    if has_points or law_has_trait(friction.law, "bonds"):
+    if model.load_varies or law_has_trait(friction.law, "bonds"):
         return shear.make_points(model, task.patch, row, task.engine.choice), None
 
     # Pieces that deform in shear are parallel Jenkins elements of the same slip curve; rigid pieces are one element of the

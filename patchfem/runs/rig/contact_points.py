@@ -95,12 +95,7 @@ def _needs_points(model: Model, numerics) -> bool:
 
 def _find_load(model: Model, patch) -> dict:
     """Return the fields of a Contact that describe a load that changes."""
-    if model.grooves is not None:
-        # The lifted mass is compared to the modal mass at the interface, m / (s . s).
-        modes = model.rig.modes
-        mass = modes.mass / float(modes.slide @ modes.slide)
-        model.grooves.check_lifted_mass(model.friction.static, mass)
-    if patch is None or not model.rig.friction.load_varies:
+    if not model.rig.friction.load_varies or model.load_varies:
         return find_load_fields(model, patch)
 
     # Without pressure, the gap at the approach of the preload is g - C f. The rotational spring of the holder is in series

@@ -318,10 +318,10 @@ def make_contact(model: Model, numerics: Numerics, patch) -> points.contacts.Con
     if rig.springs.cubic is not None:
         springs.append(points.contacts.make_cubic_spring(rig.springs.cubic, rig.modes.output))
 
-    # The points of a single interface may have lists of bonds, grooves or a load that changes.
+    # The points of a single interface may have bonds or a load that changes.
     if len(rows) == 1 and model.friction is not None:
         has_bonds = law_has_trait(model.friction.law, "bonds")
-        if has_bonds or model.grooves is not None or rig.friction.load_varies:
+        if has_bonds or rig.friction.load_varies:
             choice = bond_lists.choose_bond_summation(model, numerics) if has_bonds else None
             contact = shear.make_points(model, patch, rows[0], choice, numerics.shear_modes)
             return replace(contact, point_sets=[*contact.point_sets, *springs])

@@ -6,7 +6,12 @@ from ...effects import LAWS, law_has_trait, needs_bond_list
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
 from .contact import iterate_patches
-from .methods import MotionFeatures, find_motion_features
+from .methods import (
+    MotionFeatures,
+    find_climbed_grooves,
+    find_load_change_key,
+    find_motion_features,
+)
 from .scene_draft import SceneDraft
 from .view import UNKNOWN_VALUE
 
@@ -56,7 +61,7 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
 
 
 def check_quadrature(draft: SceneDraft, kind: str) -> None:
-    """Add a remark if the scene sets `accuracy.quadrature`, although no law of it sums over bonds.
+    """Add a remark if the scene sets a method of `accuracy.quadrature` by which its bonds are not summed.
 
     Parameters
     ----------
@@ -66,12 +71,22 @@ def check_quadrature(draft: SceneDraft, kind: str) -> None:
         Kind of the scene. Bonds are summed only in a "bench" or a "rig".
     """
     scene = draft.values
-    laws = [table.law for table in (scene.friction, *scene.structure.interface)]
-    is_summed = kind in ("bench", "rig") and any(law_has_trait(law, "bonds") for law in laws)
-    if scene.accuracy.quadrature not in ("auto", UNKNOWN_VALUE) and not is_summed:
-        draft.add_remark(
-            "accuracy.quadrature", "has no meaning without law 'nonlocal' and is not used"
-        )
+    method = scene.accuracy.quadrature
+    if method in ("auto", UNKNOWN_VALUE):
+        return
+    laws = [scene.friction, *scene.structure.interface]
+    laws = [law for law in laws if law_has_trait(law.law, "bonds")]
+    reason = ""
+    if kind not in ("bench", "rig") or not laws:
+        reason = "has no meaning without law 'nonlocal' and is not used"
+    elif any(map(needs_bond_list, laws)):
+        if method == "recursion":
+            reason = "is not used, because a recursion needs reading 'stretch' and order 1"
+    elif find_load_change_key(draft.tables) or find_climbed_grooves(draft.tables):
+        if method != "recursion":
+            reason = "is not used, because the load changes: bonds are then summed by recursion"
+    if reason:
+        draft.add_remark("accuracy.quadrature", reason)
 
 
 def check_settings(draft: SceneDraft, kind: str) -> None:

@@ -53,8 +53,6 @@ VARIABLE_STIFFNESS_KEYS = (
     "normal.grooves",
     "normal.amplitude",
 )
-# Methods of accuracy.quadrature that sum single bonds
-SINGLE_BOND_SUMS = ("direct", "truncated", "merged")
 
 
 class Joint(TableFacts):
@@ -128,19 +126,9 @@ class Joint(TableFacts):
         return suggest_laws("joints", friction=self.table)
 
     @property
-    def grooves_advice(self) -> str:
-        """Advice on a friction law that does not support grooves."""
-        return suggest_laws("grooves", friction=self.table)
-
-    @property
     def needs_list(self) -> bool:
         """Whether the law is a sum over all bonds."""
         return self.has_trait("bonds") and needs_bond_list(self.table)
-
-    @property
-    def key_preventing_recursion(self) -> str:
-        """Key of the friction law that prevents computing the sum over bonds by recursion."""
-        return "reading" if self.reading == "report" else "order"
 
     @cached_property
     def lower_shape(self) -> str:
@@ -209,7 +197,6 @@ class Feature(NamedTuple):
 LAW_FEATURES = {
     "law for one interface": lambda j: j.lacks("joints"),
     "law of an averaged pressure": lambda j: j.has_trait("averaged"),
-    "law that sticks rigidly": lambda j: j.has_trait("set-valued") and j.supports("shear"),
 }
 JOINT_FEATURES = {
     name: Feature(is_there, "{table_key}.law", "{law_description}")
@@ -246,7 +233,7 @@ JOINT_FEATURES = {
         "a friction force that depends on earlier slip",
     ),
     "kinetic below static": Feature(
-        lambda j: j.has_trait("set-valued") and j.supports("shear") and -1 < j.kinetic < j.static,
+        lambda j: j.has_trait("set-valued") and -1 < j.kinetic < j.static,
         "{table_key}.kinetic",
         "{kinetic:g} below static = {static:g}",
     ),
@@ -262,21 +249,12 @@ JOINT_FEATURES = {
         "{table_key}.initial_bonds",
         "{initial_bonds:g} with order = {order:g} (reading 'report'), whose bonds at rest no force can move,",
     ),
-    # the sum over bonds
-    "sum over all bonds": Feature(lambda j: j.needs_list, "{table_key}.{key_preventing_recursion}"),
-    "sum by recursion": Feature(lambda j: not j.needs_list),
-    "named method of the sum": Feature(
-        lambda j: j.has_trait("bonds") and j.scene.accuracy.quadrature in SINGLE_BOND_SUMS,
-        "accuracy.quadrature",
-        "'{scene.accuracy.quadrature}'",
-    ),
     # the patch
     "nonlinear asperities": Feature(
         lambda j: j.contact.asperities.law in ("exponential", "hertz"),
         "{patch_key}.asperities.law",
         "'{contact.asperities.law}'",
     ),
-    "patch that slips as a whole": Feature(lambda j: not j.compliance),
     "partial slip": Feature(lambda j: j.compliance, "{compliance}"),
     "shape on the lower piece": Feature(
         lambda j: j.lower_shape, "{lower_shape}", "a shape on the lower piece"
@@ -315,15 +293,9 @@ def find_feature(name: str) -> Feature:
     return Feature(lambda j: j.find_key_value(key), shown_key)
 
 
-# What names in braces in the advice of support.toml stand for.
-LAW_ADVICE = {"{laws_with_shear}": suggest_laws("shear")}
-
-
 def _read_rows() -> tuple[tuple[str, str], ...]:
     """Return the features of each row of support.toml, and what to do instead."""
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    for name, advice in LAW_ADVICE.items():
-        text = text.replace(name, advice)
     rows = []
     for instead, features in tomllib.loads(text).items():
         rows += zip(features, repeat(instead))

@@ -85,8 +85,10 @@ same time.
 
 **Friction is local.** The friction of a point depends on the pressure and the slip of that point. The only exception is
 law `convolution`, which averages the pressure over neighbouring points (Oden-Pires). The bonds of a point depend on the
-path of this point, that is, on the total length that it has slid. Temperature acts only through eq. 2.13, with a
-surface temperature given in the scene. Heat from friction does not change the surface temperature.
+path of this point, that is, on the total length that it has slid. Bonds of reading "stretch" and order 1 break as the
+load falls; those of other orders and of reading "report" keep the load under which they formed. Temperature acts only
+through eq. 2.13, with a surface temperature given in the scene. Heat from friction does not change the surface
+temperature.
 
 **Partial slip.** At constant load and tilt, partial slip is computed with elements that stick or slip. These elements
 are exact if both pieces have the same elastic constants. Under a changing load the shear compliance is represented by
@@ -123,7 +125,6 @@ ADVICE = {  # Property of a joint in the advice of a row -> its meaning.
     "{compliance}": "what lets the patch slip part by part",
     "{heave_key}": "the heave and the pitch of the modes",
     "{joints_advice}": "use a law that supports several interfaces",
-    "{grooves_advice}": "use a law that supports grooves",
 }
 SHAPES = [
     f"`{header.replace('contact', 'patch')}`"
@@ -155,11 +156,6 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "bonds of a given stiffness": "`stiffness` of a law that takes `bond_length` in its place",
     "spread of the bonds": f"`spread` of law {name_laws_with_key('spread')}".replace(" and ", " or "),
     "bonds that no force can move": "law nonlocal with reading 'report', -1 < `order` < 0 and `initial_bonds` > 0",
-    "sum over all bonds": "law nonlocal with reading 'report', or with an `order` other than 1",
-    "sum over all stretched bonds": "law nonlocal with reading 'stretch' and an `order` other than 1",
-    "sum by recursion": "law nonlocal with reading 'stretch' and order 1",
-    "named method of the sum": "law nonlocal with `accuracy.quadrature` one of " + ", ".join(support.SINGLE_BOND_SUMS),
-    "patch that slips as a whole": "no partial slip",
     "partial slip": "`[patch.shear]`, `patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`",
     "shape on the lower piece": "`on` is `lower` in " + join_words(SHAPES, "or"),
     "patch without a face": "no `[contact.area]`",

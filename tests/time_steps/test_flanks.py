@@ -14,31 +14,36 @@ from patchfem import load
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds, Grooves
 from patchfem.motion_measures import energy_balance
-from patchfem.points.contacts import (
-    make_flank_contact,
-)
 from patchfem.points.time_march import march
-from patchfem.runs.bench import shear
+from patchfem.runs.bench import contact_points
 from patchfem.scene.keys.tables import Friction
 from patchfem.slip.shear_modes import shear_modes
+from patchfem.time_steps import laws
+from patchfem.time_steps.contacts import Contact, PointSet
 
 LOAD, MU = 115.65, 0.4
 BASIS = make_modal_basis(2 * np.pi * 143, 0.003, mass=1.194)
 DRIVE = SineDrive(49.0, 2 * np.pi * 143)
+# Points under a load, by the length over which they reach their friction limit
 LAWS = {
-    "elastic-plastic": lambda length: SimpleNamespace(
-        law="elastic-plastic", static=MU, bond_length=length
-    ),
-    "bonds": lambda length: Bonds(MU, length),
+    "elastic-plastic": lambda length, load: laws.make_cells(MU, length, load),
+    "nonlocal": lambda length, load: laws.make_point_law("nonlocal", Bonds(MU, length), load),
 }
+
+
+def make_flank_contact(law, length, grooves, modes=None):
+    """Return points on flanks: one, or those of shear modes, which share the load."""
+    share = np.ones(1) if modes is None else LOAD_FRACTION
+    normal = LOAD * float(np.hypot(1.0, grooves.slope(0.0)))
+    points = PointSet(LAWS[law](length, normal * share), BASIS.slide, None, modes)
+    limit = grooves.max_force(LOAD, MU)
+    return Contact([points], limit, length, preload=LOAD, grooves=grooves)
 
 
 def march_amplitude(law, grooves, steps, cycles=6):
     """Return the largest displacement in the last cycle of a march; its energy balance is
     checked."""
-    result = march(
-        BASIS, DRIVE, make_flank_contact(law, grooves, LOAD, BASIS.slide), cycles, steps, window=3
-    )
+    result = march(BASIS, DRIVE, make_flank_contact(law, 2e-6, grooves), cycles, steps, window=3)
     assert result.outcome is None and energy_balance(result.ledger) < 1e-10
     return float(result.extremes[-1, 1])
 
@@ -48,9 +53,7 @@ def march_amplitude(law, grooves, steps, cycles=6):
 def test_order_two_in_step_size(law, lifted):
     """The amplitude converges with order two in the step, with and without a lifted mass."""
     grooves = Grooves(80e-6, 7.5e-6, 0.3, lifted)
-    values = [
-        march_amplitude(LAWS[law](2e-6), grooves, steps, 3) for steps in (200, 400, 800, 1600)
-    ]
+    values = [march_amplitude(law, grooves, steps, 3) for steps in (200, 400, 800, 1600)]
     changes = np.abs(np.diff(values))
     assert changes[0] / changes[2] > 6 and changes[2] < 2e-4 * abs(values[-1])
 
@@ -74,8 +77,7 @@ def follow_slide(contact, slide):
 def make_compliant_contact(law, grooves, compliance):
     """Return points on flanks with all shear modes of a compliance [m/N]."""
     modes = shear_modes(compliance, MU * LOAD * LOAD_FRACTION, COUNT)
-    law = LAWS[law](LENGTH)
-    return make_flank_contact(law, grooves, LOAD, BASIS.slide, modes, LOAD_FRACTION)
+    return make_flank_contact(law, LENGTH, grooves, modes)
 
 
 SINE_SLIDE = 20e-6 * np.sin(np.linspace(0, 7.3, 201))  # [m]
@@ -86,7 +88,8 @@ def make_coulomb_contact(grooves, tolerance, compliance=COMPLIANCE):
     bodies = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
     patch = SimpleNamespace(
         model=SimpleNamespace(area=None),
-        pressure=SimpleNamespace(sigma_n=LOAD * LOAD_FRACTION),
+        x=POSITIONS,
+        pressure=SimpleNamespace(sigma_n=LOAD * LOAD_FRACTION, load=LOAD),
         pieces=bodies,
         slip_compliance=compliance,
     )
@@ -95,9 +98,12 @@ def make_coulomb_contact(grooves, tolerance, compliance=COMPLIANCE):
         grooves=grooves,
         rig=None,
         partial_slip=True,
-        accuracy=SimpleNamespace(tolerance=tolerance),
+        load_varies=False,
+        side="upper",
+        speed_scale=1.0,
+        accuracy=SimpleNamespace(tolerance=tolerance, shear_modes=None),
     )
-    return shear.make_flank_contact(model, LOAD, patch)
+    return contact_points.make_contact(model, patch)
 
 
 def solve_coulomb_points(grooves, slide, compliance):
