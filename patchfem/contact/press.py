@@ -19,10 +19,8 @@ from ..formatting import format_length
 from . import asperity_laws
 from .press_cases import MIN_COMPUTABLE_LOAD, Holders
 from .unilateral import (
-    CONTACT_RESIDUAL_TOL,
     ContactProblem,
     ContactSolution,
-    compute_residuals,
     make_problem,
     refuse_residuals,
     solve,
@@ -54,6 +52,7 @@ def press_patch(
     gap: np.ndarray,
     holder: Holders,
     asperities: "asperity_laws.LinearAsperities | asperity_laws.SmoothAsperities | None" = None,
+    start: np.ndarray | None = None,
 ) -> PatchState:
     """Solve the contact of a patch that a holder presses.
 
@@ -70,6 +69,8 @@ def press_patch(
         Loads and prescribed motions, as numbers.
     asperities : LinearAsperities, ExponentialAsperities or HertzAsperities, optional
         Pressure law of the asperities; None if the pieces are bare.
+    start : (m,) bool ndarray, optional
+        Nodes in contact of a similar state, from which the search for the contact set starts.
 
     Returns
     -------
@@ -105,7 +106,7 @@ def press_patch(
             compliance = pieces.normal
             if asperities is not None:
                 compliance = compliance + np.diag(1 / (asperities.k * pieces.interface.weight))
-            state = _press_bare(compliance, problem)
+            state = _press_bare(compliance, problem, start)
     return state._replace(approach=float(reference + state.approach))
 
 
@@ -142,7 +143,7 @@ def _press_smooth_layer(pieces: Compliance, problem: ContactProblem, asperities)
     return PatchState(solution.force, solution.separation, approach, turn, stiffness)
 
 
-def _press_bare(compliance: np.ndarray, problem: ContactProblem) -> PatchState:
+def _press_bare(compliance: np.ndarray, problem: ContactProblem, start) -> PatchState:
     """Solve a patch that has no asperity layer, or a linear one that the compliance contains.
 
     Parameters
@@ -151,6 +152,8 @@ def _press_bare(compliance: np.ndarray, problem: ContactProblem) -> PatchState:
         Compliance [m/N] of the nodes.
     problem : ContactProblem
         Gap [m], motions and loads of the m nodes.
+    start : (m,) bool ndarray or None
+        First contact set of the search.
 
     Returns
     -------
@@ -159,8 +162,7 @@ def _press_bare(compliance: np.ndarray, problem: ContactProblem) -> PatchState:
     """
     solution = ContactSolution(np.zeros(problem.gap.size), np.zeros(0))
     if problem.target.size or problem.gap.min() < 0:
-        solution = solve(compliance, problem)
-    refuse_residuals(compute_residuals(compliance, problem, solution), CONTACT_RESIDUAL_TOL)
+        solution = solve(compliance, problem, start)
     opening = problem.gap - problem.motions @ solution.motion + compliance @ solution.force
     opening = np.where(solution.force > 0, 0.0, np.maximum(opening, 0.0))
     return PatchState(solution.force, opening, *_read_motion(solution.motion))

@@ -23,12 +23,8 @@ MIN_COMPUTABLE_LOAD = 1e-200
 MAX_ROUNDS = 40  # number of rounds after which a case counts as cycling; 3 to 20 are usual
 # Rounding error of an opening, relative to the sum of the magnitudes of its terms
 OPENING_ROUND_OFF = 1e-13
-
-
-MAX_RESIDUAL = (
-    1e-12  # largest relative residual of a solved case; that of a wrong set is 1e-9 or more
-)
-MAX_CHUNK_VALUES = 4_000_000  # numbers of a temporary array (n, q, m), 32 MB
+# Largest relative residual of a solved case; that of a wrong set is 1e-9 or more
+MAX_RESIDUAL = 1e-12
 
 
 class Holders(NamedTuple):
@@ -83,6 +79,8 @@ class PressedSets(NamedTuple):
 def press_on_table(table: SetTable, holders: Holders, amplitudes, start) -> PressedSets:
     """Find the contact set and the motion of the holder of each case.
 
+    Temporary arrays have the shape (n, q, m).
+
     Parameters
     ----------
     table : SetTable
@@ -112,35 +110,28 @@ def press_on_table(table: SetTable, holders: Holders, amplitudes, start) -> Pres
     closing = np.zeros((n_cases, len(table.columns)))
     closing[:, 2:] = -amplitudes
     active = start.copy()
-    gap_chunk = max(1, MAX_CHUNK_VALUES // table.columns.size)
 
     todo = np.arange(n_cases)
     for _ in range(MAX_ROUNDS):
-        remaining = []
-        for part in np.split(todo, range(gap_chunk, todo.size, gap_chunk)):
-            one = holders.take(part)
-            _complete_sets(table, one, amplitudes, active, part)
-            found = table.find_slots(active[part])
-            is_regular = found >= 0
-            part = part[is_regular]
-            found = found[is_regular]
-            closing[part] = _balance(table, one.take(is_regular), found, closing[part])
-            unknown = table.combine(found, closing[part])
-            wrong = _find_wrong_nodes(table, found, closing[part], unknown)
-            active[part] ^= wrong
-            is_done = ~wrong.any(axis=1)
-            slot[part[is_done]] = found[is_done]
-            remaining.append(part[~is_done])
-        todo = np.concatenate(remaining)
+        _complete_sets(table, holders.take(todo), amplitudes, active, todo)
+        found = table.find_slots(active[todo])
+        is_regular = found >= 0
+        todo = todo[is_regular]
+        found = found[is_regular]
+        closing[todo] = _balance(table, holders.take(todo), found, closing[todo])
+        wrong = _find_wrong_nodes(table, found, closing[todo])
+        active[todo] ^= wrong
+        is_done = ~wrong.any(axis=1)
+        slot[todo[is_done]] = found[is_done]
+        todo = todo[~is_done]
         if not todo.size:
             break
 
     residual = np.full(n_cases, np.inf)
     solved = np.flatnonzero(slot >= 0)
-    for part in np.split(solved, range(gap_chunk, solved.size, gap_chunk)):
-        closing[part], residual[part] = _refine_balance(
-            table, holders.take(part), slot[part], closing[part]
-        )
+    closing[solved], residual[solved] = _refine_balance(
+        table, holders.take(solved), slot[solved], closing[solved]
+    )
     return PressedSets(slot, closing, residual)
 
 
@@ -225,11 +216,11 @@ def _solve_motion(resultants, holders: Holders, missing) -> np.ndarray:
     return np.stack([approach, rotation], axis=1)
 
 
-def _find_wrong_nodes(table: SetTable, slots, closing, unknown) -> np.ndarray:
+def _find_wrong_nodes(table: SetTable, slots, closing) -> np.ndarray:
     """Return the nodes (n, m) in contact under tension and the open nodes that overlap by more than round-off."""
     scale = np.abs(closing) @ np.abs(table.columns)
     limit = np.where(table.active[slots], 0.0, -OPENING_ROUND_OFF * scale)
-    return ~(unknown >= limit)
+    return ~(table.combine(slots, closing) >= limit)
 
 
 def _refine_balance(
@@ -253,26 +244,26 @@ def _refine_balance(
     """
     active = table.active[slots]
     x = table.columns[1]
-    resultants = table.work[slots]
 
-    def compute_force(coefficients) -> np.ndarray:
+    def find_force(coefficients) -> np.ndarray:
         """Return the nodal forces (n, m) [N]."""
         return np.where(active, table.combine(slots, coefficients), 0.0)
 
-    def find_missing(coefficients) -> np.ndarray:
-        """Return load and moment (n, 2) that the forces do not balance."""
-        force = compute_force(coefficients)
-        by_spring = holders.spring * coefficients[:, 1]
-        return np.stack(
-            [holders.load - force.sum(axis=1), holders.moment - force @ x - by_spring], axis=1
-        )
+    def find_missing(force, rotation) -> np.ndarray:
+        """Return load and moment (n, 2) that forces (n, m) [N] and springs at a rotation (n,) [rad] do not balance."""
+        missing = np.empty((len(force), 2))
+        missing[:, 0] = holders.load - force.sum(axis=1)
+        missing[:, 1] = holders.moment - force @ x - holders.spring * rotation
+        return missing
 
-    change = _solve_motion(resultants, holders, find_missing(closing))
+    missing = find_missing(find_force(closing), closing[:, 1])
+    change = _solve_motion(table.work[slots], holders, missing)
     closing = closing.copy()
     closing[:, :2] += np.where(np.isnan(change), 0.0, change)
 
     # Residuals of what is prescribed
-    missing = np.abs(find_missing(closing))
+    force = find_force(closing)
+    missing = np.abs(find_missing(force, closing[:, 1]))
     moment_scale = holders.load * np.ptp(x) + np.abs(holders.spring * closing[:, 1])
     with np.errstate(divide="ignore", invalid="ignore"):
         balance = np.fmax(missing[:, 0] / holders.load, missing[:, 1] / moment_scale)
@@ -282,7 +273,7 @@ def _refine_balance(
     residual = np.fmax(np.fmax(balance, opening), 0.0)
 
     # A single node in contact does not determine a free rotation
+    is_determined = np.isfinite(closing).all(axis=1)
     is_free = holders.can_rotate & (holders.spring == 0)
-    is_determined = ~is_free | (np.count_nonzero(compute_force(closing) > 0, axis=1) > 1)
-    is_determined &= np.isfinite(closing).all(axis=1)
+    is_determined &= ~is_free | (np.count_nonzero(force > 0, axis=1) > 1)
     return closing, np.where(is_determined, residual, np.inf)

@@ -99,12 +99,14 @@ def solve_set(compliance, active, columns, *, with_ends: bool = True) -> SetSolu
     n_nodes = active.size
     n_dofs = len(compliance) // n_nodes
     n_columns = len(columns)
-    ends = find_set_ends(active[None] if with_ends else np.zeros((1, n_nodes), bool))
-    n_ends = ends.node.shape[1]
     force = np.zeros(columns.shape)
     nodes = np.flatnonzero(active)
     if not nodes.size:
         return SetSolution(force, -columns, np.zeros((0, n_columns)), np.zeros((0, n_columns)))
+    ends = SetEnds(np.zeros((1, 0), int), np.zeros((1, 0), int))
+    if with_ends:
+        ends = find_set_ends(active[None])
+    n_ends = ends.node.shape[1]
 
     # Degrees of freedom (e, b) beyond and before each end, and those of the set
     shifts = n_nodes * np.arange(n_dofs)

@@ -20,15 +20,11 @@ import numpy as np
 from ..core import NotConverged
 from ..elasticity.lapack import dpotrf
 from . import bounded
-from .press_cases import Holders, press_on_table
+from .press_cases import MAX_RESIDUAL, OPENING_ROUND_OFF, Holders, press_on_table
 from .set_table import SetTable
 
-# Largest relative residual of a solved contact; that of a wrong set is 1e-9 or more
-CONTACT_RESIDUAL_TOL = 1e-12
 # Largest residual of the conjugate gradients, whose forces then show the contact set
 GRADIENT_RESIDUAL_TOL = 1e-11
-# Rounding error of an opening, relative to the sum of the magnitudes of its terms
-OPENING_ROUND_OFF = 1e-14
 # Message about a compliance that is not positive definite
 INDEFINITE_COMPLIANCE_MESSAGE = (
     "contact: the compliance of the pieces is not positive definite to working precision; raise "
@@ -271,10 +267,13 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
     return motion
 
 
-def solve(compliance: np.ndarray, problem: ContactProblem) -> ContactSolution:
+def solve(
+    compliance: np.ndarray, problem: ContactProblem, start: np.ndarray | None = None
+) -> ContactSolution:
     """Solve the contact problem of a patch.
 
-    The forces are those of a strictly convex quadratic program, so that the method that finds them does not change them.
+    The forces are those of a strictly convex quadratic program, so that neither the set from which the search starts nor
+    the method that finds them changes them.
 
     Parameters
     ----------
@@ -282,16 +281,17 @@ def solve(compliance: np.ndarray, problem: ContactProblem) -> ContactSolution:
         C [m/N], positive definite.
     problem : ContactProblem
         Gap [m], motions and loads of the nodes.
+    start : (n,) bool ndarray, optional
+        Contact set of a similar problem, which saves iterations.
 
     Returns
     -------
     ContactSolution
-        The most accurate one that was found; `refuse_residuals` decides whether it is accurate enough.
 
     Raises
     ------
     NotConverged
-        With a remedy, if no contact set can be solved for.
+        With a remedy, if no contact set can be solved for, or if the residuals of the solution are too large.
     """
     # A patch that may rotate freely can rest on a single node, whose set does not determine the rotation
     if problem.has_free_rotation:
@@ -308,26 +308,30 @@ def solve(compliance: np.ndarray, problem: ContactProblem) -> ContactSolution:
         found = solve_on_table(compliance, moved, active)
         return found and found._replace(motion=found.motion + motion)
 
-    def is_exact(found: ContactSolution | None) -> bool:
-        """Return whether a solution meets the contact conditions to round-off."""
-        if found is None:
-            return False
-        residuals = compute_residuals(compliance, problem, found)
-        return all(value <= CONTACT_RESIDUAL_TOL for value in residuals.values())
-
     # The search starts from the rest position of a rigid piece. The closing there is about the geometric mean of the
     # deflections under a point load and under a uniform load.
-    rest_motion = find_rest_motion(problem)
-    unit_depth = np.sqrt(np.abs(compliance.diagonal().mean() * compliance.mean()))
-    closing = problem.target[:1].sum() * unit_depth
-    solution = search(problem.gap - problem.motions @ rest_motion < closing, rest_motion)
-    if solution is not None and not is_exact(solution):
-        solution = search(solution.force > 0, solution.motion)
-    if not is_exact(solution):
-        by_gradients = solve_by_gradients(compliance, problem)
-        solution = search(by_gradients.traction > 0, by_gradients.motion)
+    motion = find_rest_motion(problem)
+    if start is None or not start.any():
+        unit_depth = np.sqrt(np.abs(compliance.diagonal().mean() * compliance.mean()))
+        start = problem.gap - problem.motions @ motion < problem.target[:1].sum() * unit_depth
+
+    # A gap that is measured from the motion found loses no digits; where the sets cycle, the gradients show the set
+    for has_gradients in (False, False, True):
+        if has_gradients:
+            by_gradients = solve_by_gradients(compliance, problem)
+            start = by_gradients.traction > 0
+            motion = by_gradients.motion
+        solution = search(start, motion)
+        if solution is None:
+            continue
+        residuals = compute_residuals(compliance, problem, solution)
+        if all(value <= MAX_RESIDUAL for value in residuals.values()):
+            return solution
+        start = solution.force > 0
+        motion = solution.motion
     if solution is None:
         raise NotConverged(explain_singular_set(compliance, problem))
+    refuse_residuals(residuals, MAX_RESIDUAL)
     return solution
 
 

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.press_cases import MAX_CHUNK_VALUES
 from ...core import PatchfemError
 from . import grids, mesh_levels
 from .cases import Batch, CaseMeasures, Cases, make_cases, take_patch
@@ -32,6 +31,7 @@ MAX_SEARCHED_CASES = (
 )
 # Largest number of interface nodes of meshes that many cases share; a finer mesh slows down every case
 MAX_SHARED_NODES = 500
+MAX_CHUNK_VALUES = 4_000_000  # numbers of a temporary array of cases, columns and nodes, 32 MB
 # Number of contact sets beyond which a table is emptied between two parts of the cases; of 500 nodes, 0.1 GB
 MAX_TABLE_SETS = 6000
 

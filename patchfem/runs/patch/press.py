@@ -595,13 +595,17 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
     gap = patch_model.gap.evaluate(pieces.interface.x).heights + pair.end_gap
     holder = make_cases(patch_model, 1).holders.take(0)
     law = None if patch_model.interface.skin is None else make_skin_law(patch_model)
+    active = None
 
     def compute_forces(worn, softening) -> np.ndarray:
         """Return the contact forces (m,) [N] for a worn depth (m,) [m] and a softening (m,) [m/N]."""
+        nonlocal active
         softened = pieces
         if softening.any():
             softened = replace(pieces, normal=pieces.normal + np.diag(softening))
-        return press_patch(softened, gap + worn, holder, law).force
+        force = press_patch(softened, gap + worn, holder, law, active).force
+        active = force > 0
+        return force
 
     return compute_forces
 

@@ -413,7 +413,7 @@ def solve_worn(patch, worn):
     """Solve the contact of a patch again on its mesh or cells, with a worn depth [m] added to its unworn gap."""
     if patch.model.area is not None:
         return area.press_worn(patch, worn)
-    return solve_patch_contact(patch.model, patch.pair, worn)
+    return solve_patch_contact(patch.model, patch.pair, worn, coarse=patch)
 
 
 def compute_values(patch) -> Values:
