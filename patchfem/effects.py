@@ -238,7 +238,7 @@ EFFECTS = {
         "laws.convolution",
         "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds (Oden, Pires)",
         ("bond_length", "order spread"),
-        "exact march",
+        "joints exact march",
         "averaged set-valued timeless memoryless",
     ),
     "friction.law=iwan": _make_law(

@@ -92,8 +92,8 @@ REFUSALS = [
     ),
     (
         PAIR + FORCED,
-        "structure.interface.1.law=convolution; structure.interface.1.bond_length=1 um",
-        r"structure.interface\[2\].law: law 'convolution' with other interfaces is not supported",
+        "structure.interface.1.law=nonlocal; structure.interface.1.bond_length=1 um; structure.interface.1.order=2",
+        r"structure.interface\[2\].law: law 'nonlocal' of order 2 with other interfaces is not supported",
     ),
     (
         COULOMB_RIG,

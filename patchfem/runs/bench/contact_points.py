@@ -194,15 +194,16 @@ def _acts_on_resultant(model) -> bool:
 def _tabulate_pressure(model, patch) -> np.ndarray:
     """Return places [m] and relative pressures (2, k) of the lower piece, or slides and relative loads of the resultant.
 
-    The resultant at a slide u is sum A_i p(x_i + u), a polygon with a corner where a node passes another one.
+    The resultant at a slide is the load of the part of the lower piece that the upper one covers.
     """
     x = patch.x
     sigma = patch.pressure.sigma_n
     if not _acts_on_resultant(model):
         return np.stack([x, sigma / shear.mean_loaded_pressure(patch)])
-    slides = np.unique(x[:, None] - x)
-    pressure = np.interp(slides[:, None] + x, x, sigma, left=0.0, right=0.0)
-    return np.stack([slides, pressure @ patch.pieces.interface.weight / patch.pressure.load])
+    passed = np.append(0.0, np.cumsum((sigma[1:] + sigma[:-1]) * np.diff(x)))
+    passed /= passed[-1]
+    slides = np.append(x - x[-1], x[1:] - x[0])
+    return np.stack([slides, np.append(passed, 1 - passed[1:])])
 
 
 def make_points(

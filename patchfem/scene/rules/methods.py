@@ -326,7 +326,7 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
     in_steps = limits["march"]
     without_events = f"the motion cannot be computed from event to event {by_events}"
     law = motion.joints[0].law.law if motion.joints else None
-    is_climbing = motion.grooves and not motion.compliance and law_has_trait(law, "memoryless")
+    is_climbing = motion.grooves and not motion.compliance and law_has_trait(law, "set-valued")
     obstacles = {
         "auto": in_steps
         and by_events
@@ -335,7 +335,7 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
         "march": in_steps and f"'march' {in_steps} is not supported yet; leave `method` out",
     }
 
-    # The return map of a law knows no flanks.
+    # Steps over a stop or a release of rigid friction on a flank are inaccurate.
     if method == "march" and is_climbing and not in_steps:
         return (
             f"the motion over grooves under law '{law}' is computed from event to event; use 'exact' or leave "
