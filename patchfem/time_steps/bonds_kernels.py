@@ -2,7 +2,8 @@
 
 The force is mu z/eps_0 with the moments m, z and s2 of `friction.bonds.point_kernels`, which are exact over a step of
 constant bond length. Dahl's law has m_0 = 1 and eps_0 = mu N/stiffness, and the LuGre law moreover the bond length
-eps_0 g(v)/g(0), with Stribeck's curve g at the mean speed of the step, and the damping of bonds and lubricant.
+eps_0 g(v)/g(0), with Stribeck's curve g at the mean speed of the step, and the damping of bonds and lubricant. Under a
+constant load it stores the energy of its mean deflection z/m; only that of its bonds cannot rise as a load changes.
 """
 
 from math import exp
@@ -109,7 +110,7 @@ def prepare_bonds(numbers, memory, trial, values, count, step):
     for j in range(count):
         start = values[Value.START_LOAD + j]
         middle = 0.5 * (start + values[Value.END_LOAD + j])
-        if start != middle:
+        if start != middle and numbers[BondRow.IS_KEPT + j] == 0:
             press_bonds(numbers, trial, j, start, middle)
         if numbers[BondRow.SPEED + j] > 0:
             speed = values[Value.START_VELOCITY + j]
@@ -158,7 +159,10 @@ def finish_bonds(numbers, memory, trial, values, count, step):
         velocity = values[Value.VELOCITY + j]
         z = trial[2 * WIDTH + j]
         if middle != stop:
-            press_bonds(numbers, trial, j, middle, stop)
+            if numbers[BondRow.IS_KEPT + j] == 0:
+                press_bonds(numbers, trial, j, middle, stop)
+            elif stop <= 0:
+                trial[WIDTH + j] = trial[2 * WIDTH + j] = trial[3 * WIDTH + j] = 0.0
             values[Value.END + j] = stiffness * trial[2 * WIDTH + j]
             values[Value.ENERGY + j] = 0.5 * stiffness * trial[3 * WIDTH + j]
             values[Value.END_BY_SLIDE + j] *= trial[2 * WIDTH + j] / z if z != 0 else 1.0
@@ -189,6 +193,9 @@ def finish_bonds(numbers, memory, trial, values, count, step):
             values[Value.END + j] += by_velocity * velocity
             values[Value.END_BY_VELOCITY + j] = by_velocity
             trial[j] = length
+            if numbers[BondRow.IS_CONSTANT + j] > 0:
+                stored = trial[2 * WIDTH + j] * values[Value.STRETCH + j]
+                values[Value.ENERGY + j] = 0.5 * stiffness * stored
         elif numbers[BondRow.GROWTH + j] >= 0:
             growth = numbers[BondRow.GROWTH + j : BondRow.INITIAL : WIDTH]
             v = values[Value.START_VELOCITY + j]

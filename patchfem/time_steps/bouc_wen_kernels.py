@@ -2,7 +2,7 @@
 
 The force is mu y, |y| <= N, with springs s of the largest load so far as in `cells_kernels`, the limit of this law for a
 large exponent: along a path x = s |ds|/(N length), y/N follows the law, dy/ds = s/length (1 - |y/N|^n ...), while the load
-changes along the path. The end of a step gains no more energy than the work of the step.
+changes along the path. A rising load gives the end of a step no more energy than the work of the step.
 """
 
 from math import exp, sqrt
@@ -12,9 +12,8 @@ from ..compiled.jit import njit
 from ..friction.laws.bouc_wen_kernels import follow_path
 from .step_rows_kernels import WIDTH, Value
 
-MIN_RELAXATION = (
-    1e-3  # relaxation over a step below which the first term of a series is exact to 1e-6
-)
+# Relaxation over a step below which the first term of a series is exact to 1e-6
+MIN_RELAXATION = 1e-3
 MIN_PATH = 1e-9  # path in lengths below which the slope of the mean is half of that at the end
 
 
@@ -71,7 +70,8 @@ def slide_bouc_wen(numbers, memory, trial, values, count, step):
                 decay = exp(-relaxation)
                 share = 1 + decay - 2 * (1 - decay) / relaxation
             last = min(stop + moved.end * share * (load - middle), load)
-        most = sqrt(2 * work * left / length)
+        # Friction under a constant load may return more than this energy as it unloads: no bound below its own end
+        most = max(sqrt(2 * max(work, 0.0) * left / length), abs(stop))
         last = min(max(last, -most), most)
         trial[j] = direction * last
         trial[WIDTH + j] = left

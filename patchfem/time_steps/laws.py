@@ -7,7 +7,7 @@ import numpy as np
 from ..core import MIN_LOAD, PatchfemError
 from ..friction.bonds.parameters import Bonds, growth_numbers
 from ..friction.laws.iwan import slider_cells
-from .step_rows_kernels import VECTOR, WIDTH, Law
+from .step_rows_kernels import VECTOR, WIDTH, BondRow, Law
 
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
 MIN_COMPLIANCE = 1e-2  # smallest compliance of modes left out at a point, relative to the largest
@@ -179,17 +179,26 @@ def make_iwan(law, load, n_cells: int = N_CELLS) -> PointLaw:
 
 def make_bonds(bonds: Bonds, load) -> PointLaw:
     """Return points of bonds of order 1 and reading "stretch" under a load [N]."""
-    rest = (0.0, 0.0, 0.0, 0.0)
+    rest = (0.0,) * 6
     numbers = (bonds.static, bonds.length, *growth_numbers(bonds), bonds.initial, *rest)
     load = np.asarray(load, float)
     memory = (bonds.length, bonds.initial * load, 0.0, 0.0)
     return _pack(Law.BONDS, numbers, memory, load, bonds.static * load / bonds.length)
 
 
+def keep_loads(points: PointLaw) -> PointLaw:
+    """Return points whose bonds, if they have any, keep the load under which they formed until they have none."""
+    if points.law != Law.BONDS:
+        return points
+    numbers = points.numbers.copy()
+    numbers[BondRow.IS_KEPT // WIDTH] = 1.0
+    return points._replace(numbers=numbers)
+
+
 def make_lugre(law, load) -> PointLaw:
     """Return points of the LuGre law (`friction.laws.lugre.LuGre`) under a load [N], as a sum over bonds."""
     length = law.static / law.stiffness
-    damping = (law.kinetic, law.speed, law.micro_damping, law.viscous)
+    damping = (law.kinetic, law.speed, law.micro_damping, law.viscous, 0.0, 0.0)
     numbers = (law.static, length, *NO_GROWTH, 1.0, *damping)
     load = np.asarray(load, float)
     viscosity = (law.micro_damping + law.viscous) * load

@@ -725,12 +725,18 @@ def solve_step(system, level, row, end):
     end : float
         End of the step, as a fraction of the whole step.
     """
+    points = system.points
     moves = system.ports.values
     duration = system.options.step / (1 << level)
     find_damping(system, level)
+    if system.structure.path.size:
+        # A prescribed slide has a constant velocity in each step.
+        for block in range(points.law.size):
+            for j in range(points.count[block]):
+                points.values[block, Value.START_VELOCITY + j] = moves[Port.VELOCITY, 0]
 
     # Velocity of order 2 from two increments (BDF2), of order 1 in the first step
-    last = system.points.clock[0]
+    last = points.clock[0]
     ratio = duration / last if last > 0 else 0.0
     part = find_order(system) * ratio / (1 + ratio)
     step = Step(duration, (1 + part) / duration, part * ratio / duration)

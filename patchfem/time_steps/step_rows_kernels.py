@@ -126,6 +126,9 @@ class BondRow(IntEnum):
     - INITIAL: density m_0 of the bonds that a rising load forms
     - KINETIC, SPEED: kinetic coefficient of friction and Stribeck velocity [m/s] of the LuGre law, or 0
     - DAMPING, VISCOUS: damping of the bonds and viscous friction per unit of load [s/m]
+    - IS_KEPT: 1 if bonds keep the load under which they formed until the point has none, as on the pressure of the lower
+      piece
+    - IS_CONSTANT: 1 if the load of the point never changes
 
     Memory: bond length [m], m [N], z [N m], s2 [N m2].
     """
@@ -138,6 +141,8 @@ class BondRow(IntEnum):
     SPEED = 9 * WIDTH
     DAMPING = 10 * WIDTH
     VISCOUS = 11 * WIDTH
+    IS_KEPT = 12 * WIDTH
+    IS_CONSTANT = 13 * WIDTH
 
 
 class Points(NamedTuple):

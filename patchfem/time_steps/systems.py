@@ -6,7 +6,7 @@ from ..core import ModalBasis
 from ..friction.bonds.list_numbers import make_no_lists
 from ..points import time_march
 from ..points.march_rows import RESULTANT, Options, Port, Ports, Shear, Structure, System, Total
-from .step_rows_kernels import N_VALUES, WIDTH, Law, Points, Value
+from .step_rows_kernels import N_VALUES, WIDTH, BondRow, Law, Points, Value
 
 # Lengths of the steps: whole ones, and those after up to seven halvings, by which a step that fails is retried
 N_LEVELS = 8
@@ -54,6 +54,9 @@ def make_system(
     compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
 
     points = _make_points(contact, len(rows))
+    if not contact.has_loads:
+        is_constant = slice(BondRow.IS_CONSTANT, BondRow.IS_CONSTANT + WIDTH)
+        points.numbers[points.law == Law.BONDS, is_constant] = 1.0
     size = len(rows) + points.stiffness.size
     ports = Ports(
         rows,

@@ -296,12 +296,12 @@ ENGINES = [  # Scene, changes and the engine that a plan chooses.
     (COULOMB_RIG, UNDAMPED + "drive.frequency=0.00034 Hz; drive.acceleration=18 g; drive.cycles=12", "march"),
     (POINT + COULOMB + SLIDE, "", "bench, closed form"),
     (POINT + PLASTIC + SLIDE, "", "bench, parallel elements"),
-    (POINT + NONLOCAL + SLIDE, "", "bench, recursion"),
+    (POINT + NONLOCAL + SLIDE, "", "bench, contact points"),
     (POINT + NONLOCAL + SLIDE, "friction.order=2", "bench, merged bond list"),
     (POINT + NONLOCAL + SLIDE, "friction.reading=report", "bench, merged bond list"),
     (POINT + NONLOCAL + SLIDE, "accuracy.quadrature=truncated", "bench, truncated bond list"),
-    (TILTED + NONLOCAL + SLIDE, "contact.tilt.on=lower", "bench, recursion"),
-    (TILTED + NONLOCAL + SLIDE, "contact.shear={}", "bench, bond points"),
+    (TILTED + NONLOCAL + SLIDE, "contact.tilt.on=lower", "bench, contact points"),
+    (TILTED + NONLOCAL + SLIDE, "contact.shear={}", "bench, contact points"),
 ]  # fmt: skip
 
 

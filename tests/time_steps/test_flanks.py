@@ -83,10 +83,16 @@ def make_compliant_contact(law, grooves, compliance):
 SINE_SLIDE = 20e-6 * np.sin(np.linspace(0, 7.3, 201))  # [m]
 
 
+class Patch(SimpleNamespace):
+    """Pressed patch that is a key of the cache, as that of the package."""
+
+    __hash__ = object.__hash__
+
+
 def make_coulomb_contact(grooves, tolerance, compliance=COMPLIANCE):
     """Return points on flanks with Coulomb friction."""
     bodies = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
-    patch = SimpleNamespace(
+    patch = Patch(
         model=SimpleNamespace(area=None),
         x=POSITIONS,
         pressure=SimpleNamespace(sigma_n=LOAD * LOAD_FRACTION, load=LOAD),

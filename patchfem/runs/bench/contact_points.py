@@ -21,6 +21,7 @@ from ...points.march_rows import LOWER
 from ...time_steps import laws
 from ...time_steps.contacts import Contact, PointSet
 from ...time_steps.systems import find_stiffness
+from ..patch import store
 from . import shear
 
 # Largest number of shear modes of laws whose points have the compliance of the modes left out: for Coulomb's law the loop
@@ -223,8 +224,7 @@ def make_points(
         Whether heave and pitch change its pressure, so that every node has a load of its own.
     """
     keys = surface.keys
-    has_bonds = law_has_trait(keys.law, "bonds")
-    if has_bonds:
+    if law_has_trait(keys.law, "bonds"):
         min_rest_speed = 0.0 if model.rig is None else MIN_RIG_REST_SPEED
         law = make_bond_parameters(keys, model.speed_scale, min_rest_speed)
     else:
@@ -241,19 +241,7 @@ def make_points(
             surface, _make_law_points(surface, law, force), nodes if moves else None
         )
 
-    # The shear modes of nodes that may be pressed later are weighted with an added pressure.
-    weight = force
-    if moves:
-        weight = force + shear.ADDED_WEIGHT_PRESSURE_FRACTION * force.mean()
-    elif surface.lower is not None:
-        weight = np.maximum(force, shear.UNLOADED_NODE_PRESSURE_FRACTION * force.mean())
-    length = getattr(law, "length", None) or 0.0
-    fall = shear.find_steepest_fall(law) if has_bonds else 0.0
-    most = MAX_MODES if keys.law in laws.STIFF_LAWS else shear.MAX_MODES
-    softness = shear.Softness(length, fall, most)
-    count = n_modes or model.accuracy.shear_modes
-    limit = keys.static * weight
-    modes = shear.choose_modes(surface.soft, limit, softness, count, model.accuracy.tolerance)
+    modes = _choose_modes(model, surface, law, n_modes, moves=moves)
 
     # Rigid friction and that of a speed have the compliance of the modes left out.
     own = shear.find_own_compliance(surface.soft)[modes.points]
@@ -261,6 +249,46 @@ def make_points(
     least = MIN_NEGLECTED if law_has_trait(keys.law, "set-valued") else 0.0
     points = _make_law_points(surface, law, force[modes.points], np.maximum(neglected, least * own))
     return _make_point_set(surface, points, modes.points if moves else None, modes)
+
+
+def _choose_modes(model, surface: Surface, law, n_modes: int | None, *, moves: bool):
+    """Return the shear modes of a surface, which the cache keeps for all runs with the same Patch.
+
+    Parameters
+    ----------
+    model : Model
+        Model with the tolerance and the number of shear modes.
+    surface : Surface
+        Surface whose pieces deform in shear.
+    law : friction law or Bonds
+        Law of the points.
+    n_modes : int or None
+        Number of shear modes; None: by the scene, otherwise by the tolerance.
+    moves : bool
+        Whether heave and pitch change its pressure.
+    """
+    keys = surface.keys
+    force = surface.force
+    count = n_modes or model.accuracy.shear_modes
+    tolerance = model.accuracy.tolerance
+    is_below = surface.lower is not None
+
+    def compute():
+        """Compute the shear modes."""
+        # Nodes that may be pressed later are weighted with an added pressure.
+        weight = force
+        if moves:
+            weight = force + shear.ADDED_WEIGHT_PRESSURE_FRACTION * force.mean()
+        elif is_below:
+            weight = np.maximum(force, shear.UNLOADED_NODE_PRESSURE_FRACTION * force.mean())
+        length = getattr(law, "length", None) or 0.0
+        fall = shear.find_steepest_fall(law) if law_has_trait(keys.law, "bonds") else 0.0
+        most = MAX_MODES if keys.law in laws.STIFF_LAWS else shear.MAX_MODES
+        softness = shear.Softness(length, fall, most)
+        return shear.choose_modes(surface.soft, keys.static * weight, softness, count, tolerance)
+
+    key = ("shear modes", surface.soft, keys, float(force.sum()), moves, is_below, count, tolerance)
+    return store.get_or_compute(key, compute)
 
 
 def _make_point_set(surface: Surface, points, nodes=None, modes=None) -> PointSet:
@@ -284,7 +312,8 @@ def _make_point_set(surface: Surface, points, nodes=None, modes=None) -> PointSe
     if modes is not None:
         x = x[modes.points]
         shares = shares[modes.points]
-    return replace(point_set, nodes=np.full(x.size, LOWER), shares=shares, places=x)
+    below = {"nodes": np.full(x.size, LOWER), "shares": shares, "places": x}
+    return replace(point_set, law=laws.keep_loads(points), **below)
 
 
 def _make_law_points(surface: Surface, law, mean, compliance=0.0) -> laws.PointLaw:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Missing
-from ...effects import law_has_trait
+from ...effects import law_has_trait, law_supports
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds.parameters import MAX_LIST_SECONDS
 from . import contact_points
@@ -61,19 +61,14 @@ def choose_bench_engine(
         Method of the sum over bonds, if it is known.
     """
     f = model.friction
-    has_bonds = law_has_trait(f.law, "bonds")
     if law_has_trait(f.law, "memoryless") and not model.partial_slip:
         return BenchEngine(CLOSED_FORM)
-    if uses_contact_points(model):
-        return BenchEngine(CONTACT_POINTS)
-    if not has_bonds:
+    if uses_parallel_elements(model):
         return BenchEngine(PARALLEL_ELEMENTS)
-    if model.partial_slip and not contact_points.sums_over_lists(model):
-        return BenchEngine("bond points")
+    if not contact_points.sums_over_lists(model):
+        return BenchEngine(CONTACT_POINTS)
 
     choice = choice or choose_bond_summation(model, slide)
-    if choice.engine == "recursion":
-        return BenchEngine("recursion", choice)
     kind = "bond lists" if model.partial_slip or model.side == "lower" else "bond list"
     return BenchEngine(f"{choice.engine} {kind}", choice)
 
@@ -205,19 +200,12 @@ def refuse_slow_list(seconds: float, limit: float) -> None:
         )
 
 
-def uses_contact_points(model) -> bool:
-    """Return whether a bench run is computed by the points of `contact_points`."""
-    is_soft = bool(model.partial_slip)
-    return contact_points.needs_time_steps(model, is_soft=is_soft, varies=model.load_varies)
-
-
 def uses_parallel_elements(model) -> bool:
-    """Return whether the partial slip of a bench run is computed by parallel elements."""
-    return (
-        model.partial_slip
-        and not law_has_trait(model.friction.law, "bonds")
-        and not uses_contact_points(model)
-    )
+    """Return whether parallel elements compute a bench run, which they do exactly at a constant load."""
+    friction = model.friction
+    is_constant = model.grooves is None and not has_changing_pressure(model)
+    is_known = law_supports(friction, "shear") or not model.partial_slip
+    return is_constant and is_known and law_supports(friction, "pieces")
 
 
 def nodal_element_limit(model, patch):
@@ -225,7 +213,7 @@ def nodal_element_limit(model, patch):
 
     The result is None for other methods, and for the cells of a face, whose tractions are interpolated.
     """
-    is_exact = uses_parallel_elements(model) and model.patch.area is None
+    is_exact = model.partial_slip and uses_parallel_elements(model) and model.patch.area is None
     return model.friction.static * patch.pressure.sigma_n if is_exact else None
 
 

@@ -124,12 +124,13 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
     halved = CoarseRun(max(4, steps // 8 * 4), 0, choice)
     quarter = CoarseRun(max(4, steps // 16 * 4), 0, choice)
     # Parallel elements follow any path exactly, so that the steps affect only the harmonics.
-    sampled_steps = None if uses_parallel_elements(model) else steps
+    is_exact = model.partial_slip and uses_parallel_elements(model)
+    sampled_steps = None if is_exact else steps
     rule = partial(convergence_errors, steps=sampled_steps)
     out = [CoarserRuns((halved, quarter), rule, source="steps")]
 
     has_coarser_mesh = len(patches) > 1
-    if has_coarser_mesh and uses_parallel_elements(model):
+    if has_coarser_mesh and is_exact:
         length = model.friction.bond_length
         steps_on_coarse_mesh = model.slide.steps(
             COARSE_MESH_STEPS_TOL, model.accuracy.steps_per_cycle, length

@@ -11,15 +11,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import slip
+from ... import slip, time_steps
 from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...points import contacts, slides
-from ...points.laws import make_elements, make_point_law
+from ...points.laws import make_point_law
 from ..patch import jenkins_elements
 from . import averaged_law, contact_points, shear
-from .engine import CLOSED_FORM, CONTACT_POINTS, BenchEngine, BondListGuard, has_changing_pressure
+from .engine import (
+    CLOSED_FORM,
+    PARALLEL_ELEMENTS,
+    BenchEngine,
+    BondListGuard,
+    has_changing_pressure,
+)
 
 N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
 # Largest ratio of created to dissipated energy at which the created energy counts as round-off.
@@ -338,10 +344,9 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
         local = np.where(sigma > 0, local_slip[frames, None], task.slide[frames, None])
 
     # The stretch of bonds on rigid pieces is that of their force, at most one bond length.
-    has_bonds = law_has_trait(model.friction.law, "bonds") and model.grooves is None
-    has_stretch = contact.engine is None and (has_bonds or model.load_varies)
-    if has_stretch and not model.partial_slip:
-        length = model.friction.bond_length or 0.0
+    is_rigid = not model.partial_slip and model.grooves is None
+    if is_rigid and law_has_trait(model.friction.law, "bonds"):
+        length = model.friction.bond_length
         local_slip = task.slide - np.clip(_find_stretch(task, motion.force, load), -length, length)
         stretch = _find_stretch(task, tau, task.evaluate_pressure(frames))
         local = task.slide[frames, None] - stretch
@@ -364,30 +369,31 @@ def _find_stretch(task: SlideTask, force, load) -> np.ndarray:
     """
     limit = task.model.friction.static * load
     share = np.divide(force, limit, out=np.zeros_like(force), where=limit > 0)
-    return (task.model.friction.bond_length or 0.0) * share
+    return task.model.friction.bond_length * share
 
 
 def _make_contact(task: SlideTask):
     """Return the contact points of a bench, and the JenkinsSet of pieces that are replaced by parallel elements, or None."""
     model = task.model
     friction = model.friction
-    if task.engine.method == CONTACT_POINTS:
-        contact = contact_points.make_contact(
-            model, task.patch, has_half_cells=task.engine.has_half_cells
-        )
-        return contact, None
+    engine = task.engine
     row = np.zeros(0)
-    if model.load_varies or law_has_trait(friction.law, "bonds"):
-        return shear.make_points(model, task.patch, row, task.engine.choice), None
+    if engine.choice is not None:
+        return shear.make_points(model, task.patch, row, engine.choice), None
 
-    # Pieces that deform in shear are parallel Jenkins elements of the same slip curve; rigid pieces are one element of the
-    # law itself.
-    if model.partial_slip:
+    # Pieces that deform in shear are parallel Jenkins elements of the same slip curve.
+    if engine.method == PARALLEL_ELEMENTS and model.partial_slip:
         length = make_law(friction).length
         jenkins_set = jenkins_elements.elements(task.patch, friction.static, length)
-        law = make_elements(jenkins_set.stiffness, jenkins_set.yield_displacement)
-        return contacts.make_contact([law], [row]), jenkins_set
+        yields = jenkins_set.yield_displacement
+        law = time_steps.laws.make_elements(jenkins_set.stiffness, yields)
+        point_set = time_steps.contacts.PointSet(law, row)
+        return time_steps.contacts.Contact([point_set], float(law.limits.sum())), jenkins_set
 
-    load = float(task.evaluate_pressure([0])[0] @ task.weight)
-    law = make_point_law(friction.law, make_law(friction, load), load)
-    return contacts.make_contact([law], [row]), None
+    # Masing's rule has no error of cells.
+    if engine.method == PARALLEL_ELEMENTS and law_has_trait(friction.law, "cells"):
+        load = float(task.evaluate_pressure([0])[0] @ task.weight)
+        law = make_point_law(friction.law, make_law(friction, load), load)
+        return contacts.make_contact([law], [row]), None
+    half = engine.has_half_cells
+    return contact_points.make_contact(model, task.patch, has_half_cells=half), None
