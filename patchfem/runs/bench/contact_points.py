@@ -18,9 +18,7 @@ from ...effects import law_has_trait, law_takes_stiffness_or_length, needs_bond_
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED
 from ...points.march_rows import LOWER
-from ...time_steps import laws
-from ...time_steps.contacts import Contact, PointSet
-from ...time_steps.systems import find_stiffness
+from ...time_steps import contacts, laws, systems
 from ..patch import store
 from . import shear
 
@@ -56,7 +54,7 @@ class Surface(NamedTuple):
     - force: mean load of a point [N], or mean loads of the nodes (m,)
     - soft: Patch whose pieces deform in shear, or None
     - row (n,): slide per modal coordinate
-    - n_cells: number of cells of an Iwan model
+    - has_half_cells: whether an Iwan model has half of its cells, to estimate their error
     - rise: load of the points at the start over their mean load
     - lower: LowerPlaces if the pressure belongs to the lower piece, or None
     """
@@ -66,7 +64,7 @@ class Surface(NamedTuple):
     force: np.ndarray
     soft: object
     row: np.ndarray
-    n_cells: int = laws.N_CELLS
+    has_half_cells: bool = False
     rise: float = 1.0
     lower: LowerPlaces | None = None
 
@@ -120,7 +118,7 @@ def needs_time_steps(model, *, is_soft: bool, varies: bool) -> bool:
     return is_fixed and varies
 
 
-def make_contact(model, patch, *, has_half_cells: bool = False) -> Contact:
+def make_contact(model, patch, *, has_half_cells: bool = False) -> contacts.Contact:
     """Return the contact points of a bench.
 
     Parameters
@@ -137,14 +135,13 @@ def make_contact(model, patch, *, has_half_cells: bool = False) -> Contact:
     if patch is not None:
         force = patch.pressure.sigma_n * patch.pieces.interface.weight
     soft = patch if model.partial_slip else None
-    n_cells = laws.N_CELLS // 2 if has_half_cells else laws.N_CELLS
-    surface = Surface(model.friction, float(force.sum()), force, soft, np.zeros(0), n_cells)
+    surface = Surface(model.friction, float(force.sum()), force, soft, np.zeros(0), has_half_cells)
     surface = place_surface(model, patch, surface)
     points = make_points(model, surface)
     limit = model.friction.static * float(force.sum())
     if model.grooves is not None:
         limit = model.grooves.max_force(fields["preload"], model.friction.static)
-    return Contact([points], limit, find_length(points), **fields)
+    return contacts.Contact([points], limit, find_length(points), **fields)
 
 
 def place_surface(model, patch, surface: Surface) -> Surface:
@@ -209,7 +206,7 @@ def _tabulate_pressure(model, patch) -> np.ndarray:
 
 def make_points(
     model, surface: Surface, n_modes: int | None = None, *, moves: bool = False
-) -> PointSet:
+) -> contacts.PointSet:
     """Return the points of a surface.
 
     Parameters
@@ -291,7 +288,7 @@ def _choose_modes(model, surface: Surface, law, n_modes: int | None, *, moves: b
     return store.get_or_compute(key, compute)
 
 
-def _make_point_set(surface: Surface, points, nodes=None, modes=None) -> PointSet:
+def _make_point_set(surface: Surface, points, nodes=None, modes=None) -> contacts.PointSet:
     """Return the points of a surface as a PointSet, at their places over the lower piece if that has the pressure.
 
     Parameters
@@ -305,7 +302,7 @@ def _make_point_set(surface: Surface, points, nodes=None, modes=None) -> PointSe
     modes : ShearModes, optional
         Shear of the pieces.
     """
-    point_set = PointSet(points, surface.row, nodes, modes)
+    point_set = contacts.PointSet(points, surface.row, nodes, modes)
     if surface.lower is None:
         return point_set
     x, shares = surface.lower
@@ -336,11 +333,12 @@ def _make_law_points(surface: Surface, law, mean, compliance=0.0) -> laws.PointL
         points = laws.make_cells(law.static, law.length, mean, is_fixed=True)
         return points._replace(load=np.broadcast_to(load, points.load.shape))
     if keys.law == "iwan":
-        return laws.make_iwan(law, np.maximum(load, MIN_LOAD), surface.n_cells)
+        n_cells = laws.N_CELLS // 2 if surface.has_half_cells else laws.N_CELLS
+        return laws.make_iwan(law, np.maximum(load, MIN_LOAD), n_cells)
     return laws.make_point_law(keys.law, law, load, compliance)
 
 
-def find_length(point_set: PointSet) -> float:
+def find_length(point_set: contacts.PointSet) -> float:
     """Return the displacement [m] over which an interface stretches before it slips; 0 for a rigid one."""
-    stiffness = find_stiffness(point_set)
+    stiffness = systems.find_stiffness(point_set)
     return float(point_set.law.limits.sum() / stiffness) if stiffness else 0.0

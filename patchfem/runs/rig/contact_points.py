@@ -62,7 +62,7 @@ def make_contact(model: Model, numerics, patch) -> Contact:
         if not sets:
             surfaces = _list_surfaces(model, numerics, patch)
             if numerics.has_half_cells:
-                surfaces = [part._replace(n_cells=laws.N_CELLS // 2) for part in surfaces]
+                surfaces = [part._replace(has_half_cells=True) for part in surfaces]
             moves = "sets" in fields
             count = numerics.shear_modes
             sets = [make_points(model, part, count, moves=moves) for part in surfaces]
