@@ -18,6 +18,7 @@ from ...effects import law_has_trait, law_takes_stiffness_or_length, needs_bond_
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED
 from ...points.march_rows import LOWER
+from ...slip import shear_modes
 from ...time_steps import contacts, laws, systems
 from ..patch import store
 from . import shear
@@ -25,9 +26,6 @@ from . import shear
 # Largest number of shear modes of laws whose points have the compliance of the modes left out: for Coulomb's law the loop
 # area then has an error of 5e-4
 MAX_MODES = 16
-# Smallest compliance in series with rigid friction at a node, relative to that of the node. All modes of a few nodes leave
-# none out, and the march solves rigid friction only at whole ports. It changes amplitudes by up to 5e-4.
-MIN_NEGLECTED = 1e-2
 MEMORY_LAWS = (
     "iwan",
     "bouc-wen",
@@ -241,10 +239,11 @@ def make_points(
     modes = _choose_modes(model, surface, law, n_modes, moves=moves)
 
     # Rigid friction and that of a speed have the compliance of the modes left out.
-    own = shear.find_own_compliance(surface.soft)[modes.points]
-    neglected = own - (modes.shape**2 / modes.stiffness).sum(axis=1)
-    least = MIN_NEGLECTED if law_has_trait(keys.law, "set-valued") else 0.0
-    points = _make_law_points(surface, law, force[modes.points], np.maximum(neglected, least * own))
+    own = 0.0
+    if keys.law in laws.STIFF_LAWS:
+        diagonal = shear.find_own_compliance(surface.soft)[modes.points]
+        modes, own = shear_modes.share_rest(modes, diagonal)
+    points = _make_law_points(surface, law, force[modes.points], own)
     return _make_point_set(surface, points, modes.points if moves else None, modes)
 
 

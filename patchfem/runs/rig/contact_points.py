@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...contact import contact_sets
-from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega
 from ...time_steps import laws
@@ -20,7 +19,6 @@ from ..bench.contact_points import (
     find_length,
     find_load_fields,
     make_points,
-    needs_time_steps,
     place_surface,
 )
 from ..patch import faces
@@ -76,21 +74,8 @@ def make_contact(model: Model, numerics, patch) -> Contact:
 
 
 def _needs_points(model: Model, numerics) -> bool:
-    """Return whether the march of `points` computes a model, and not that of `time_steps`.
-
-    Bonds behind elastic pieces of several interfaces need `time_steps` too, unless they are summed over lists.
-    """
-    if model.friction is None:
-        return True
-    friction = model.rig.friction
-    is_soft = bool(model.partial_slip or friction.has_partial_slip)
-    if needs_time_steps(model, is_soft=is_soft, varies=friction.load_varies):
-        return False
-    has_bonds = law_has_trait(model.friction.law, "bonds")
-    if not (has_bonds and is_soft and len(friction.interfaces) > 1):
-        return True
-    is_listed = bond_lists.choose_bond_summation(model, numerics).engine != "recursion"
-    return is_listed or model.side == "lower"
+    """Return whether a model has lists of bonds, which the march of `points` computes, and not that of `time_steps`."""
+    return bond_lists.has_bond_list(model, numerics)
 
 
 def _find_load(model: Model, patch) -> dict:
