@@ -177,6 +177,12 @@ def make_bonds(bonds: Bonds, load) -> PointLaw:
     return _pack(Law.BONDS, numbers, memory, load, bonds.static * load / bonds.length)
 
 
+def make_list(bonds: Bonds, load) -> PointLaw:
+    """Return points under a load [N] whose bonds are summed one by one, over lists."""
+    load = np.asarray(load, float)
+    return _pack(Law.LIST, (bonds.static, 0.0), (0.0,), load, bonds.static * load / bonds.length)
+
+
 def keep_loads(points: PointLaw) -> PointLaw:
     """Return points whose bonds, if they have any, keep the load under which they formed until they have none."""
     if points.law != Law.BONDS:

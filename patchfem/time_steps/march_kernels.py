@@ -41,6 +41,7 @@ from ..points.march_rows import (
     Total,
 )
 from ..points.motion_kernels import (
+    INCREMENT_ROUND_OFF,
     TINY_LOAD,
     advance_shear,
     find_point_load,
@@ -51,6 +52,7 @@ from ..points.motion_kernels import (
     store_base,
     subtract_step,
 )
+from . import lists_kernels as lists
 from .laws_kernels import slide_points
 from .step_rows_kernels import VECTOR, WIDTH, Law, Step, Value
 
@@ -60,7 +62,10 @@ MAX_LOAD_ITERATIONS = (
 )
 MAX_CUTS = 8  # trials of a line search, each with a third of the step before
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
-STALLED = 1e3  # largest residual of such a step relative to RESIDUAL
+# Largest residual of such a step relative to RESIDUAL, and that of lists, because sums over bonds jump by up to 1e-8
+STALLED = 1e3
+LISTS_STALLED = 1e5
+LIST_CUTS = 30  # trials of a line search for lists, down to round-off, between whose sides the force may jump
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
 # compliance of ports that share a force (`time_march.REDUNDANT`)
@@ -69,13 +74,13 @@ TINY = 1e-300  # m, in place of no path
 
 
 @njit(**NJIT_CALL)
-def slide_block(points, block, move, velocity, damping, step):
+def slide_block(system, block, move, velocity, damping, step):
     """Slide a block of points by an increment of their port; write forces and slopes.
 
     Parameters
     ----------
-    points : step_rows_kernels.Points
-        Points; the block is changed.
+    system : march_rows.System
+        Arrays of the march; the block is changed.
     block : int
         Number of the block.
     move : float
@@ -87,6 +92,7 @@ def slide_block(points, block, move, velocity, damping, step):
     step : Step
         Duration and formula of the velocity.
     """
+    points = system.points
     values = points.values[block]
     port = points.port[block]
     n_lanes = count_lanes(points, block)
@@ -112,15 +118,18 @@ def slide_block(points, block, move, velocity, damping, step):
             velocity = step.rate * values[Value.SLIDE + j] - step.lag * last
             values[Value.VELOCITY + j] = velocity
 
-    slide_points(
-        points.law[block],
-        points.numbers[block],
-        points.memory[block],
-        points.trial[block],
-        values,
-        points.count[block],
-        step,
-    )
+    if points.law[block] == Law.LIST:
+        lists.slide_lists(system.lists, points.numbers[block], values, points.count[block], step)
+    else:
+        slide_points(
+            points.law[block],
+            points.numbers[block],
+            points.memory[block],
+            points.trial[block],
+            values,
+            points.count[block],
+            step,
+        )
 
     # Mean force on the port: the path mean over the part that slides, the mean of both ends over the part of the pieces
     rest = 1 - damping
@@ -219,7 +228,7 @@ def write_forces(system, level, step):
                 continue
             velocity = ratio * moves[Port.END_VELOCITY, p]
             slide_block(
-                points, block, ratio * moves[Port.MOVE, p], velocity, moves[Port.DAMPING, p], step
+                system, block, ratio * moves[Port.MOVE, p], velocity, moves[Port.DAMPING, p], step
             )
             force += sum_points(points, block, Value.FORCE)
             by_slide += sum_points(points, block, Value.BY_SLIDE)
@@ -500,8 +509,10 @@ def solve_forces(system, level, step):
     residual = max(write_residual(system, level), change / LOAD_RESIDUAL)
     smallest = residual
     n_stalls = 0
+    has_lists = system.options.has_lists > 0
+    stalled = LISTS_STALLED if has_lists else STALLED
     for _ in range(MAX_NEWTON_ITERATIONS):
-        if residual <= 1.0 or (n_stalls >= MAX_STALLS and residual <= STALLED):
+        if residual <= 1.0 or (n_stalls >= MAX_STALLS and residual <= stalled):
             return True
         system.totals[Total.ITERATIONS] += 1
         write_matrix(system, level, step)
@@ -514,7 +525,7 @@ def solve_forces(system, level, step):
         # The line search accepts a step that decreases the largest residual.
         fraction = 1.0
         before = residual
-        for _ in range(MAX_CUTS):
+        for _ in range(LIST_CUTS if has_lists else MAX_CUTS):
             subtract_step(system, fraction)
             change = write_balanced_forces(system, level, step)
             if change < 0:
@@ -525,7 +536,28 @@ def solve_forces(system, level, step):
             fraction *= 0.3
         n_stalls = n_stalls + 1 if residual >= 0.5 * smallest else 0
         smallest = min(smallest, residual)
-    return residual <= STALLED
+
+        # Between the sides of a jump of a force the equation has no better solution.
+        if has_lists and system.points.stiffness.size == 0:
+            if fraction * find_largest_move(system, level) <= INCREMENT_ROUND_OFF:
+                return True
+    return residual <= stalled
+
+
+@njit(**NJIT_CALL)
+def find_largest_move(system, level):
+    """Return the largest increment of a port by Newton's step `ports.step`, relative to the largest one without forces."""
+    moves = system.ports.values
+    compliance = system.ports.compliance[level]
+    largest = 0.0
+    size = TINY
+    for p in range(moves.shape[1]):
+        size = max(size, abs(moves[Port.FREE, p]))
+        change = 0.0
+        for k in range(moves.shape[1]):
+            change += compliance[0, p, k] * system.ports.step[k]
+        largest = max(largest, abs(change))
+    return largest / size
 
 
 @njit(**NJIT_CALL)
@@ -691,6 +723,9 @@ def commit(system, duration):
             rest += moves[Port.FORCE, p] * moves[Port.RETURN, p]
             limit = points.numbers[block, WIDTH] * values[Value.END_LOAD]
             values[Value.END] = limit * points.trial[block, 0]
+        elif points.law[block] == Law.LIST:
+            numbers = points.numbers[block]
+            lists.advance_lists(system.lists, numbers, values, points.count[block], duration)
         n_lanes = count_lanes(points, block)
         for j in range(n_lanes):
             values[Value.TOTAL + j] += values[Value.SLIDE + j]
@@ -837,7 +872,7 @@ def press_at_rest(system):
         if points.law[block] == Law.COULOMB:
             limit = points.numbers[block, WIDTH] * values[Value.END_LOAD]
             values[Value.END] = limit * points.memory[block, 0]
-        else:
+        elif points.law[block] != Law.LIST:
             slide_points(
                 points.law[block],
                 points.numbers[block],

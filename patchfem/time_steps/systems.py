@@ -3,10 +3,10 @@
 import numpy as np
 
 from ..core import ModalBasis
-from ..friction.bonds.list_numbers import make_no_lists
+from ..friction.bonds.list_numbers import make_lists, make_no_lists
 from ..points import time_march
 from ..points.march_rows import RESULTANT, Options, Port, Ports, Shear, Structure, System, Total
-from .step_rows_kernels import N_VALUES, WIDTH, BondRow, Law, Points, Value
+from .step_rows_kernels import N_VALUES, WIDTH, BondRow, Law, ListRow, Points, Value
 
 # Lengths of the steps: whole ones, and those after up to seven halvings, by which a step that fails is retried
 N_LEVELS = 8
@@ -85,7 +85,7 @@ def make_system(
         float(travel),
         max(float(contact.limit), 1e-300),
         int(has_events),
-        0,
+        int((points.law == Law.LIST).any()),
         int(contact.has_loads),
         0,
     )
@@ -93,10 +93,10 @@ def make_system(
     if start is not None:
         state[0] = [*start.z, *start.v]
     sets = time_march.make_no_sets() if contact.sets is None else contact.sets.make_arrays()
-    no_lists = make_no_lists(0)
+    lists = _make_lists(contact, points)
     flank = time_march.make_flank(contact)
     totals = np.zeros(len(Total))
-    system = System(structure, ports, points, no_lists, flank, sets, state, totals, options)
+    system = System(structure, ports, points, lists, flank, sets, state, totals, options)
     _set_start(system, contact)
     return system
 
@@ -261,6 +261,18 @@ def _make_points(contact, n_ports: int) -> Points:
         np.zeros(1),
         np.zeros((stiffness.size, 2)),
     )
+
+
+def _make_lists(contact, points: Points):
+    """Return the lists of bonds (`strip_rows_kernels.BondLists`), and number the points that have one."""
+    is_list = points.law == Law.LIST
+    if not is_list.any():
+        return make_no_lists(0)
+    is_used = is_list[:, None] & (np.arange(WIDTH) < points.count[:, None])
+    indices = points.numbers[:, ListRow.INDEX : ListRow.INDEX + WIDTH]
+    indices[is_used] = np.arange(is_used.sum())
+    loads = points.values[:, Value.END_LOAD : Value.END_LOAD + WIDTH]
+    return make_lists(*contact.bond_sum, loads[is_used])
 
 
 def _count_memory(sets, blocks) -> np.ndarray:
