@@ -34,6 +34,11 @@ class PointLaw(NamedTuple):
     memory: np.ndarray
     load: float | np.ndarray
 
+    @property
+    def limits(self) -> np.ndarray:
+        """Friction limits [N] of points of a law whose first number is the coefficient of friction."""
+        return self.numbers[1] * self.load
+
 
 def _pack(law: Law, numbers, memory=(), load=1.0, n_memory: int = N_MEMORY) -> PointLaw:
     """Return a PointLaw whose other numbers and memory are 0.

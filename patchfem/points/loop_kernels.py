@@ -91,10 +91,11 @@ def try_step(system, level, row, begin, end, drive):
     is_shortest = level == system.structure.responses.shape[0] - 1
     if system.options.has_events:
         last = drive[0] + dt * (drive[1] + 0.5 * dt * drive[2])
-        if steps.find_event(system, last, is_shortest):
+        if steps.find_event(system, level, last):
             return False
     if not is_solved:
-        if not is_shortest:
+        # After a shortest step without a solution the march has no result, and shorter steps would only take time.
+        if not is_shortest and system.totals[Total.UNSOLVED] == 0:
             return False
         system.totals[Total.UNSOLVED] += 1
 

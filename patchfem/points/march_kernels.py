@@ -535,20 +535,21 @@ def find_loads(system, row, fraction, is_solved):
 
 
 @njit(**NJIT_CALL)
-def find_event(system, drive, is_shortest):
+def find_event(system, level, drive):
     """Return whether a rigid point stops or is released, or friction would gain energy, within the trial step.
 
-    A step that cannot be halved is not searched again: a rigid point changes its regime there.
+    A step of the last level is not searched again: a rigid point changes its regime there.
 
     Parameters
     ----------
     system : march_rows.System
         Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
     drive : float
         Drive at the end of the step [m s-2].
-    is_shortest : bool
-        Whether the step cannot be halved.
     """
+    is_shortest = level == system.structure.responses.shape[0] - 1
     ports = system.ports
     points = system.points
     found = False

@@ -57,8 +57,8 @@ class Port(IntEnum):
     - BASE: force from which a line search starts [N]
     - LAST, EARLIER, FIRST: mean forces of the last three steps [N], the last one first
     - DAMPING: weight of the force at the end of the step in the mean force, above 0 where the step does not resolve the
-      vibration of the port on its points
-    - STIFFNESS, VISCOSITY: of the points at rest [N/m], [N s/m]
+      decay of its velocity by the viscosity of its points
+    - VISCOSITY: of the points at rest [N s/m]
     - MOVE: increment of the points [m]
     """
 
@@ -80,9 +80,8 @@ class Port(IntEnum):
     RETURN = 15
     FIRST = 16
     DAMPING = 17
-    STIFFNESS = 18
-    VISCOSITY = 19
-    MOVE = 20
+    VISCOSITY = 18
+    MOVE = 19
 
 
 class Shear(IntEnum):
@@ -216,7 +215,7 @@ class Ports(NamedTuple):
       that a constant force on another port takes away; C and G in `march_kernels`
     - grip (P, P): acceleration of a port that a force on another port takes away [1/kg]
     - redundant (P,): compliance of a port at rest relative to its own, which determines the forces of more ports than modes
-    - values (21, P): see `Port`
+    - values (20, P): see `Port`
     - matrix (P + r, P + r), vector, step (P + r,): Jacobian, residuals and step of Newton's method for P port forces and r
       shear coordinates
     - contact (11,): numbers of the heave and pitch ports (-1 for none), then the results of `path_mean` in the order of

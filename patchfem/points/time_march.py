@@ -141,12 +141,11 @@ class Motion:
 
 def load_kernels(contact: Contact, say=None):
     """Return the compiled march with the parts that a contact needs: its laws, lists of bonds, contact sets."""
-    if contact.engine is not None:
-        return load_loop(contact, "time_steps.march_kernels", {}, say)
+    package = "points" if contact.engine is None else "time_steps"
     parts = {}
     if contact.bond_sum is None:
-        parts["lists"] = "points.no_lists_kernels"
-    return load_loop(contact, "points.march_kernels", parts, say)
+        parts["lists"] = f"{package}.no_lists_kernels"
+    return load_loop(contact, f"{package}.march_kernels", parts, say)
 
 
 def load_loop(contact: Contact, module: str, parts: dict[str, str], say=None):

@@ -28,6 +28,9 @@ from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, use_one_blas_thre
 EQUAL_YIELD_TOL = 1e-11
 # Largest number of sorts of the nodes before they are eliminated one by one
 MAX_SORTING_PASSES = 2
+# Smallest compliance of modes left out, relative to that of the most compliant one. Pieces that are rigid in series with one
+# spring have a single mode, which then gives a part of its compliance to the nodes.
+MIN_REST = 1e-9
 # Number of modes with which a reduction starts; without an asperity layer its error is 1e-6 of the
 # friction limit
 N_SHEAR_MODES = 4
@@ -364,6 +367,40 @@ def _compute_all_modes(tangential, friction_limit, steepest_fall: float) -> Shea
     modes = ShearModes(points, friction_limit, shape, 1 / compliance)
     require_stability(modes, steepest_fall)
     return modes
+
+
+class SharedModes(NamedTuple):
+    """Shear modes, and the compliance (a,) [m/N] that each node has in series with them."""
+
+    modes: ShearModes
+    own: np.ndarray
+
+
+def share_rest(modes: ShearModes, diagonal: np.ndarray) -> SharedModes:
+    """Return shear modes and own compliances of the nodes that together stand for all modes of the pieces.
+
+    The modes s_k obey sum s_k s_k^T = D^-1 with the friction limits D. The eigenvalues of the modes left out are replaced
+    by their mean r, so that each node has the compliance r/D of its own, and those of the modes that are kept are less
+    by r. With all modes but one this is exact. A node with rigid friction needs an own compliance in a march in time.
+
+    Parameters
+    ----------
+    modes : ShearModes
+        Most compliant modes of a nodes.
+    diagonal : (a,) array
+        Displacement of each node per force on it [m/N], by all modes.
+    """
+    modes = modes.select(max(min(modes.stiffness.size, modes.limit.size - 1), 1))
+    values = 1 / modes.stiffness
+    n_left = max(modes.limit.size - values.size, 1)
+    rest = (float(modes.limit @ diagonal) - values.sum()) / n_left
+    rest = max(rest, MIN_REST * values[0])
+
+    # Modes as stiff as the mean are a part of it.
+    is_softer = values - rest > MIN_REST * values[0]
+    modes = modes.select(max(int(is_softer.sum()), 1))
+    values = values[: modes.stiffness.size]
+    return SharedModes(replace(modes, stiffness=1 / (values - rest)), rest / modes.limit)
 
 
 def require_stability(modes: ShearModes, steepest_fall: float) -> None:

@@ -10,7 +10,6 @@ from ..friction.laws.iwan import slider_cells
 from .step_rows_kernels import VECTOR, WIDTH, BondRow, Law
 
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
-MIN_COMPLIANCE = 1e-2  # smallest compliance of modes left out at a point, relative to the largest
 # Cells of an Iwan model; the force of first loading is exact to 6e-5 of the friction limit for chi >= -0.5
 N_CELLS = 96
 NO_GROWTH = (-1.0, 0.0, 0.0, 0.0, 0.0)  # growth numbers of bonds of constant length
@@ -110,14 +109,6 @@ def _pack(law: Law, numbers, memory, load, stiffness=0.0, viscosity=0.0) -> Poin
     return PointLaw(law, rows[:first], rows[first:-3], *rows[-3:])
 
 
-def _limit_below(compliance):
-    """Return the compliances (m,) [m/N] of points, at least MIN_COMPLIANCE times the largest one.
-
-    A nearly rigid point would make Newton's method lose digits.
-    """
-    return np.maximum(compliance, MIN_COMPLIANCE * np.max(compliance))
-
-
 def make_cells(static, length, load, *, is_fixed: bool = False) -> PointLaw:
     """Return points of a spring and a slider each.
 
@@ -186,6 +177,12 @@ def make_bonds(bonds: Bonds, load) -> PointLaw:
     return _pack(Law.BONDS, numbers, memory, load, bonds.static * load / bonds.length)
 
 
+def make_list(bonds: Bonds, load) -> PointLaw:
+    """Return points under a load [N] whose bonds are summed one by one, over lists."""
+    load = np.asarray(load, float)
+    return _pack(Law.LIST, (bonds.static, 0.0), (0.0,), load, bonds.static * load / bonds.length)
+
+
 def keep_loads(points: PointLaw) -> PointLaw:
     """Return points whose bonds, if they have any, keep the load under which they formed until they have none."""
     if points.law != Law.BONDS:
@@ -232,7 +229,6 @@ def make_tanh(law, load, compliance=0.0) -> PointLaw:
     load = np.asarray(load, float)
     if np.any(compliance):
         # In a series of both, the spring limits the force of fast motions.
-        compliance = _limit_below(compliance)
         stiffness = 1 / compliance
         viscosity = 0.0
     else:
@@ -262,7 +258,7 @@ def make_coulomb(law, load, compliance=0.0) -> PointLaw:
     if np.any(compliance):
         # The stiffness 1/compliance is that of the springs of a reference load, also at points that have no load yet.
         reference = np.max(load)
-        length = law.static * reference * _limit_below(compliance)
+        length = law.static * reference * np.asarray(compliance)
         stiffness = law.static * reference / length
         numbers = (law.static, length, 1.0)
         return _pack(Law.CELLS, numbers, (0.0, reference), load, stiffness)

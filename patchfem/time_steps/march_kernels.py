@@ -13,13 +13,14 @@ samples of a monotone stroke, whatever the step. F dq is the work of the laws pl
 
 Newton's method has the Jacobian in the space of ports and coordinates. A step that it does not solve is halved. Loads that
 follow from the motion (normal contact under heave and pitch, flanks of grooves, pressure of the lower piece) are iterated
-with it. Where a step does not resolve the vibration of a port on its points, x = C K + G V > 1 with their stiffness K and
-viscosity V, the weight 1 - 1/x goes to the end of the step, in the force and in the increment of the points: the vibration
-decays.
+with it. Where a step does not resolve the decay of the velocity of a port by the viscosity V of its points, x = G V > 1, the
+weight 1 - 1/x goes to the end of the step, in the force and in the increment of the points. A vibration on stiff points that
+the step does not resolve stays undamped, so that comparisons with fewer steps show its error.
 
-Rigid friction (`Law.COULOMB`) is solved with its port. With a constant acceleration A/dt of the port by all other forces,
-its velocity falls to 0 at a known time; then the port rests, or its motion is reversed. The mean of the force over the time
-of the step is explicit in A. A port at rest is brought back to its place after the step.
+A rigid point (`Law.COULOMB`), the only one on its port, slips under a given force, or its port is held at rest. A step in
+which a slipping port would reverse, or a port at rest is released, is halved up to the last level. The constant force of a
+step lets a held port move and come back. The work of this motion is taken from that of the drive, as friction at rest does
+none.
 
 `system` is a `march_rows.System` with `step_rows_kernels.Points`. A step of level k lasts a whole step over 2^k.
 """
@@ -40,6 +41,7 @@ from ..points.march_rows import (
     Total,
 )
 from ..points.motion_kernels import (
+    INCREMENT_ROUND_OFF,
     TINY_LOAD,
     advance_shear,
     find_point_load,
@@ -50,6 +52,7 @@ from ..points.motion_kernels import (
     store_base,
     subtract_step,
 )
+from . import lists_kernels as lists
 from .laws_kernels import slide_points
 from .step_rows_kernels import VECTOR, WIDTH, Law, Step, Value
 
@@ -59,19 +62,25 @@ MAX_LOAD_ITERATIONS = (
 )
 MAX_CUTS = 8  # trials of a line search, each with a third of the step before
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
-STALLED = 1e3  # largest residual of such a step relative to RESIDUAL
+# Largest residual of such a step relative to RESIDUAL, and that of lists, because sums over bonds jump by up to 1e-8
+STALLED = 1e3
+LISTS_STALLED = 1e5
+LIST_CUTS = 30  # trials of a line search for lists, down to round-off, between whose sides the force may jump
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
+# Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
+# compliance of ports that share a force (`time_march.REDUNDANT`)
+CREEP = 1e-7
 TINY = 1e-300  # m, in place of no path
 
 
 @njit(**NJIT_CALL)
-def slide_block(points, block, move, velocity, damping, step):
+def slide_block(system, block, move, velocity, damping, step):
     """Slide a block of points by an increment of their port; write forces and slopes.
 
     Parameters
     ----------
-    points : step_rows_kernels.Points
-        Points; the block is changed.
+    system : march_rows.System
+        Arrays of the march; the block is changed.
     block : int
         Number of the block.
     move : float
@@ -83,9 +92,10 @@ def slide_block(points, block, move, velocity, damping, step):
     step : Step
         Duration and formula of the velocity.
     """
+    points = system.points
     values = points.values[block]
     port = points.port[block]
-    n_lanes = (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
+    n_lanes = count_lanes(points, block)
     start = points.first_shear[port]
     stop = points.first_shear[port + 1]
 
@@ -108,15 +118,18 @@ def slide_block(points, block, move, velocity, damping, step):
             velocity = step.rate * values[Value.SLIDE + j] - step.lag * last
             values[Value.VELOCITY + j] = velocity
 
-    slide_points(
-        points.law[block],
-        points.numbers[block],
-        points.memory[block],
-        points.trial[block],
-        values,
-        points.count[block],
-        step,
-    )
+    if points.law[block] == Law.LIST:
+        lists.slide_lists(system.lists, points.numbers[block], values, points.count[block], step)
+    else:
+        slide_points(
+            points.law[block],
+            points.numbers[block],
+            points.memory[block],
+            points.trial[block],
+            values,
+            points.count[block],
+            step,
+        )
 
     # Mean force on the port: the path mean over the part that slides, the mean of both ends over the part of the pieces
     rest = 1 - damping
@@ -211,18 +224,15 @@ def write_forces(system, level, step):
         by_velocity = 0.0
         for block in range(points.first[p], points.first[p + 1]):
             if points.law[block] == Law.COULOMB:
-                force = move_rigid_port(system, level, p, block)
+                force = slip_rigidly(system, p, block)
                 continue
             velocity = ratio * moves[Port.END_VELOCITY, p]
             slide_block(
-                points, block, ratio * moves[Port.MOVE, p], velocity, moves[Port.DAMPING, p], step
+                system, block, ratio * moves[Port.MOVE, p], velocity, moves[Port.DAMPING, p], step
             )
-            values = points.values[block]
-            n_lanes = (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
-            for j in range(n_lanes):
-                force += values[Value.FORCE + j]
-                by_slide += values[Value.BY_SLIDE + j]
-                by_velocity += values[Value.BY_VELOCITY + j]
+            force += sum_points(points, block, Value.FORCE)
+            by_slide += sum_points(points, block, Value.BY_SLIDE)
+            by_velocity += sum_points(points, block, Value.BY_VELOCITY)
         moves[Port.SUM, p] = force
         moves[Port.BY_SLIDE, p] = by_slide
         moves[Port.BY_VELOCITY, p] = by_velocity
@@ -230,8 +240,7 @@ def write_forces(system, level, step):
     if flank.size:
         end = 0.0
         for block in range(points.first[1]):
-            for j in range(points.count[block]):
-                end += points.values[block, Value.END + j]
+            end += sum_points(points, block, Value.END)
         flanks.add_climb(flank, moves, moves[Port.MOVE, 0], step.duration, end)
         moves[Port.BY_VELOCITY, 0] *= flank[Flank.RATIO] ** 2
     if system.structure.path.size:
@@ -241,18 +250,13 @@ def write_forces(system, level, step):
 
 
 @njit(**NJIT_CALL)
-def move_rigid_port(system, level, p, block):
-    """Return the time mean of the rigid friction on a port over a step [N]; write its slope by A and its slide.
-
-    A is the change of the velocity of the port in the step by all other forces [m/s]. The slope dF/dA [N s/m] is in
-    `Value.BY_VELOCITY`, the slide of the point in SLIDE. `Value.STRETCH` is 1 if the port is at rest at the end.
+def slip_rigidly(system, p, block):
+    """Return the friction [N] of the rigid point of port p, 0 for a port at rest; write its slide.
 
     Parameters
     ----------
     system : march_rows.System
         Arrays of the march, changed in place.
-    level : int
-        Level of the step, which lasts a whole step over 2^level.
     p : int
         Number of the port.
     block : int
@@ -260,39 +264,13 @@ def move_rigid_port(system, level, p, block):
     """
     points = system.points
     values = points.values[block]
-    moves = system.ports.values
-    mobility = system.ports.compliance[level, 1, p, p]
+    increment = system.ports.values[Port.INCREMENT, p]
+    values[Value.SLIDE] = increment
+    if system.structure.path.size:
+        points.trial[block, 0] = np.sign(increment)
     load = 0.5 * (values[Value.START_LOAD] + values[Value.END_LOAD])
-    static = points.numbers[block, 0] * load
-    limit = points.numbers[block, WIDTH] * load
-    values[Value.SLIDE] = moves[Port.INCREMENT, p]
-    values[Value.STRETCH] = 0.0
-    values[Value.BY_VELOCITY] = 0.0
-    if mobility == 0.0:
-        # The motion is prescribed.
-        return limit * np.sign(moves[Port.INCREMENT, p])
-
-    # 0 for a port at rest, whose state has a velocity of round-off, which would hide its static friction
-    first = values[Value.START_VELOCITY]
-    change = moves[Port.END_VELOCITY, p] - first + mobility * moves[Port.FORCE, p]
-    direction = np.sign(first)
-    if first == 0.0:
-        direction = np.sign(change)
-    v = abs(first)
-    a = direction * change
-    stop = mobility * limit
-    if v + a - stop >= 0 and (v > 0 or a > mobility * static):
-        return direction * limit
-
-    # The port stops after the fraction `part` of the step; then it rests, or slides back.
-    part = v / (stop - a) if v > 0 else 0.0
-    if abs(a) <= mobility * static:
-        values[Value.STRETCH] = 1.0
-        values[Value.SLIDE] = 0.5 * first * part * system.options.step / (1 << level)
-        values[Value.BY_VELOCITY] = 1 / mobility
-        return (first + change) / mobility
-    values[Value.BY_VELOCITY] = 2 * limit * part / (stop - a)
-    return direction * limit * (2 * part - 1)
+    values[Value.FORCE] = points.trial[block, 0] * points.numbers[block, WIDTH] * load
+    return values[Value.FORCE]
 
 
 @njit(**NJIT_CALL)
@@ -309,10 +287,16 @@ def write_residual(system, level):
     size = system.options.scale
     for p in range(n_ports):
         vector[p] = moves[Port.SUM, p] - moves[Port.FORCE, p]
-        vector[p] -= ports.redundant[p] * moves[Port.FORCE, p]
         size = max(size, abs(moves[Port.FORCE, p]))
     if ports.contact[0] >= 0:
         size = max(size, normal.add_residuals(system))
+
+    # A port that is held has the velocity 0 at the end: its residual is the force that would stop it. Ports that one mode
+    # holds together share their force by the small compliance `redundant`.
+    for p in range(n_ports):
+        if moves[Port.HELD, p] > 0:
+            vector[p] = moves[Port.END_VELOCITY, p] / ports.compliance[level, 1, p, p]
+            vector[p] -= ports.redundant[p] * moves[Port.FORCE, p]
     largest = find_port_residual(system, level, size)
 
     # kappa (b + db) = shapes^T f1
@@ -328,12 +312,40 @@ def write_residual(system, level):
 
 
 @njit(**NJIT_CALL)
+def count_lanes(points, block):
+    """Return the number of points of a block, rounded up to whole vectors."""
+    return (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
+
+
+@njit(**NJIT_CALL)
+def sum_points(points, block, row):
+    """Return the sum over a block of a row of `Value`."""
+    values = points.values[block]
+    total = 0.0
+    for j in range(count_lanes(points, block)):
+        total += values[row + j]
+    return total
+
+
+@njit(**NJIT_CALL)
 def sum_shape(points, k, block, row):
-    """Return the sum over a block of the shape of shear coordinate k times a row of `Value`."""
+    """Return the sum over a block of the shape of shear coordinate k times a row of `Value`.
+
+    Parameters
+    ----------
+    points : step_rows_kernels.Points
+        Points.
+    k : int
+        Number of the shear coordinate.
+    block : int
+        Number of the block.
+    row : Value
+        Row of the values.
+    """
     shape = points.shapes[k]
     values = points.values[block]
     at = WIDTH * block
-    n_lanes = (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
+    n_lanes = count_lanes(points, block)
     total = 0.0
     for j in range(n_lanes):
         total += shape[at + j] * values[row + j]
@@ -378,17 +390,18 @@ def write_matrix(system, level, step):
                 matrix[n_ports + l, k] = ratio * points.products[l, 0] * move
         for l in range(start, stop):
             matrix[p, n_ports + l] = ratio * points.products[l, 1]
-
-        # Rigid friction is a function of the velocity that all other forces give to the port.
-        block = points.first[p]
-        if block < points.first[p + 1] and points.law[block] == Law.COULOMB:
-            slope = points.values[block, Value.BY_VELOCITY]
-            for k in range(n_ports):
-                matrix[p, k] = -slope * compliance[1, p, k] if k != p else 0.0
-        matrix[p, p] -= 1.0 + ports.redundant[p]
+        matrix[p, p] -= 1.0
 
     if ports.contact[0] >= 0:
         normal.add_slopes(system, level)
+
+    # Ports that hold have the derivative of their end velocity in place of that of a force. A small compliance of their
+    # own makes the forces unique where more ports hold than there are modes.
+    for p in range(n_ports):
+        if moves[Port.HELD, p] > 0:
+            for k in range(n_ports):
+                matrix[p, k] = -compliance[1, p, k] / compliance[1, p, p]
+            matrix[p, p] -= ports.redundant[p]
 
 
 @njit(**NJIT_CALL)
@@ -420,7 +433,7 @@ def write_products(points, p, matrix, n_ports, step):
     for block in range(points.first[p], points.first[p + 1]):
         values = points.values[block]
         at = WIDTH * block
-        n_lanes = (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
+        n_lanes = count_lanes(points, block)
         for k in range(start, stop):
             shape = points.shapes[k]
             by_slide = 0.0
@@ -496,8 +509,10 @@ def solve_forces(system, level, step):
     residual = max(write_residual(system, level), change / LOAD_RESIDUAL)
     smallest = residual
     n_stalls = 0
+    has_lists = system.options.has_lists > 0
+    stalled = LISTS_STALLED if has_lists else STALLED
     for _ in range(MAX_NEWTON_ITERATIONS):
-        if residual <= 1.0 or (n_stalls >= MAX_STALLS and residual <= STALLED):
+        if residual <= 1.0 or (n_stalls >= MAX_STALLS and residual <= stalled):
             return True
         system.totals[Total.ITERATIONS] += 1
         write_matrix(system, level, step)
@@ -510,7 +525,7 @@ def solve_forces(system, level, step):
         # The line search accepts a step that decreases the largest residual.
         fraction = 1.0
         before = residual
-        for _ in range(MAX_CUTS):
+        for _ in range(LIST_CUTS if has_lists else MAX_CUTS):
             subtract_step(system, fraction)
             change = write_balanced_forces(system, level, step)
             if change < 0:
@@ -521,7 +536,28 @@ def solve_forces(system, level, step):
             fraction *= 0.3
         n_stalls = n_stalls + 1 if residual >= 0.5 * smallest else 0
         smallest = min(smallest, residual)
-    return residual <= STALLED
+
+        # Between the sides of a jump of a force the equation has no better solution.
+        if has_lists and system.points.stiffness.size == 0:
+            if fraction * find_largest_move(system, level) <= INCREMENT_ROUND_OFF:
+                return True
+    return residual <= stalled
+
+
+@njit(**NJIT_CALL)
+def find_largest_move(system, level):
+    """Return the largest increment of a port by Newton's step `ports.step`, relative to the largest one without forces."""
+    moves = system.ports.values
+    compliance = system.ports.compliance[level]
+    largest = 0.0
+    size = TINY
+    for p in range(moves.shape[1]):
+        size = max(size, abs(moves[Port.FREE, p]))
+        change = 0.0
+        for k in range(moves.shape[1]):
+            change += compliance[0, p, k] * system.ports.step[k]
+        largest = max(largest, abs(change))
+    return largest / size
 
 
 @njit(**NJIT_CALL)
@@ -568,51 +604,110 @@ def find_loads(system, row, fraction, is_solved):
 
 @njit(**NJIT_CALL)
 def is_held(points, p):
-    """Return whether port p is held at rest by rigid friction at the end of the last step."""
+    """Return whether port p is held at rest by its rigid point."""
     block = points.first[p]
     is_rigid = block < points.first[p + 1] and points.law[block] == Law.COULOMB
-    return is_rigid and points.values[block, Value.STRETCH] > 0
+    return is_rigid and points.memory[block, 0] == 0
 
 
 @njit(**NJIT_CALL)
-def find_event(system, drive, is_shortest):
-    """Return whether a rigid port stops, is reversed or begins to slip in the trial step, which can then be halved.
+def find_event(system, level, drive):
+    """Return whether a rigid point stops or is released, or gains energy, within the trial step.
+
+    A step of the last level is not searched again: a rigid point changes its regime there.
 
     Parameters
     ----------
     system : march_rows.System
-        Arrays of the march.
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
     drive : float
-        Drive at the end of the step [m s-2], which is not used.
-    is_shortest : bool
-        Whether the step cannot be halved.
+        Drive at the end of the step [m s-2].
     """
-    if is_shortest:
-        return False
     points = system.points
     moves = system.ports.values
+    duration = system.options.step / (1 << level)
+    is_shortest = level == system.structure.responses.shape[0] - 1
+    is_found = False
+    is_any_held = False
     for block in range(points.law.size):
         if points.law[block] != Law.COULOMB:
             continue
         p = points.port[block]
-        first = points.values[block, Value.START_VELOCITY]
-        is_held = points.values[block, Value.STRETCH] > 0
-        if is_held != (first == 0.0) or first * moves[Port.END_VELOCITY, p] < 0:
-            return True
-        # The force that holds a port at the end of the step follows from the means of the last two steps.
-        hold = 1.5 * moves[Port.FORCE, p] - 0.5 * moves[Port.LAST, p]
+        direction = points.memory[block, 0]
+        is_any_held = is_any_held or direction == 0
+
+        # Friction gains energy in a step that does not resolve a reversal. Other ports at rest may hold a slipping port too,
+        # which then creeps.
+        creep = find_creep(system, block)
+        round_off = RESIDUAL * abs(moves[Port.SLIDE, p])
+        is_reversed = direction * moves[Port.INCREMENT, p] < -creep * duration - round_off
+        is_found = is_found or is_reversed or direction * moves[Port.END_VELOCITY, p] < -creep
+    if is_found and not is_shortest:
+        return True
+
+    # Ports that creep stop with the port that has reversed, because one motion of the modes may move both.
+    for block in range(points.law.size if is_found else 0):
+        speed = points.memory[block, 0] * moves[Port.END_VELOCITY, points.port[block]]
+        if points.law[block] == Law.COULOMB and speed < find_creep(system, block):
+            points.trial[block, 0] = 0.0
+    return is_any_held and release_port(system, drive, is_shortest)
+
+
+@njit(**NJIT_CALL)
+def find_creep(system, block):
+    """Return the largest velocity [m/s] of the rigid point of a block at which its port may be at rest."""
+    p = system.points.port[block]
+    force = abs(system.points.values[block, Value.FORCE])
+    return CREEP * system.ports.compliance[0, 1, p, p] * force
+
+
+@njit(**NJIT_CALL)
+def release_port(system, drive, is_shortest):
+    """Return whether a port at rest is released in the trial step, which can then be halved; the shortest step releases it.
+
+    Of the ports whose holding force exceeds its limit, that with the largest ratio is released.
+
+    Parameters
+    ----------
+    system : march_rows.System
+        Arrays of the march, changed in place.
+    drive : float
+        Drive at the end of the step [m s-2].
+    is_shortest : bool
+        Whether the step cannot be halved.
+    """
+    points = system.points
+    ports = system.ports
+    # Row 2 of the state is that at the end of the trial step.
+    for p in range(ports.values.shape[1]):
+        ports.vector[p] = sum_forces(system, p)
+    normal.find_holds(system, system.state[2], drive)
+    worst = -1
+    largest = 1.0
+    for p in range(ports.values.shape[1]):
+        if ports.values[Port.HELD, p] == 0:
+            continue
+        block = points.first[p]
         limit = points.numbers[block, 0] * points.values[block, Value.END_LOAD]
-        if is_held and abs(hold) > limit:
-            return True
-    return False
+        hold = abs(ports.values[Port.HOLD, p])
+        if hold > largest * limit:
+            worst = p
+            largest = hold / limit if limit > 0 else np.inf
+    if worst < 0:
+        return False
+    if is_shortest:
+        points.trial[points.first[worst], 0] = np.sign(ports.values[Port.HOLD, worst])
+    return not is_shortest
 
 
 @njit(**NJIT_CALL)
 def commit(system, duration):
     """Advance memories, shear coordinates and loads after an accepted step of a `duration` [s].
 
-    `Port.RETURN` of a rigid port becomes the displacement that is taken back because it was at rest, and `Total.REST` the
-    work of the drive on these displacements.
+    `Port.RETURN` of a port that rested becomes the displacement that is taken back, and `Total.REST` the work of the drive
+    on these displacements.
     """
     points = system.points
     moves = system.ports.values
@@ -620,14 +715,18 @@ def commit(system, duration):
     for block in range(points.law.size):
         values = points.values[block]
         if points.law[block] == Law.COULOMB:
+            # A port that was at rest before stays at its place.
             p = points.port[block]
-            moves[Port.RETURN, p] = moves[Port.INCREMENT, p] - values[Value.SLIDE]
+            was_held = moves[Port.HELD, p] > 0 and points.trial[block, 0] == 0
+            moves[Port.RETURN, p] = moves[Port.INCREMENT, p] if was_held else 0.0
+            values[Value.SLIDE] = moves[Port.INCREMENT, p] - moves[Port.RETURN, p]
             rest += moves[Port.FORCE, p] * moves[Port.RETURN, p]
             limit = points.numbers[block, WIDTH] * values[Value.END_LOAD]
-            v = moves[Port.END_VELOCITY, p]
-            values[Value.VELOCITY] = 0.0 if values[Value.STRETCH] > 0 else v
-            values[Value.END] = limit * np.sign(v if v != 0 else values[Value.SLIDE])
-        n_lanes = (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
+            values[Value.END] = limit * points.trial[block, 0]
+        elif points.law[block] == Law.LIST:
+            numbers = points.numbers[block]
+            lists.advance_lists(system.lists, numbers, values, points.count[block], duration)
+        n_lanes = count_lanes(points, block)
         for j in range(n_lanes):
             values[Value.TOTAL + j] += values[Value.SLIDE + j]
             values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
@@ -654,8 +753,7 @@ def find_damping(system, level):
     ports = system.ports
     moves = ports.values
     for p in range(moves.shape[1]):
-        x = ports.compliance[level, 0, p, p] * moves[Port.STIFFNESS, p]
-        x += ports.compliance[level, 1, p, p] * moves[Port.VISCOSITY, p]
+        x = ports.compliance[level, 1, p, p] * moves[Port.VISCOSITY, p]
         moves[Port.DAMPING, p] = 1 - 1 / x if x > 1 else 0.0
 
 
@@ -756,8 +854,7 @@ def sum_forces(system, p):
     points = system.points
     total = 0.0
     for block in range(points.first[p], points.first[p + 1]):
-        for j in range(points.count[block]):
-            total += points.values[block, Value.START + j]
+        total += sum_points(points, block, Value.START)
     return total
 
 
@@ -772,7 +869,10 @@ def press_at_rest(system):
         values = points.values[block]
         for j in range(points.count[block]):
             values[Value.SLIDE + j] = 0.0
-        if points.law[block] != Law.COULOMB:
+        if points.law[block] == Law.COULOMB:
+            limit = points.numbers[block, WIDTH] * values[Value.END_LOAD]
+            values[Value.END] = limit * points.memory[block, 0]
+        elif points.law[block] != Law.LIST:
             slide_points(
                 points.law[block],
                 points.numbers[block],
@@ -839,13 +939,11 @@ def write_ports(system, sample):
         for block in range(points.first[p], points.first[p + 1]):
             values = points.values[block]
             numbers = points.numbers[block]
-            is_rigid = points.law[block] == Law.COULOMB
-            n_lanes = (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
+            n_lanes = count_lanes(points, block)
             for j in range(n_lanes):
                 weight = values[Value.END_LOAD + j] * numbers[j]
-                elastic = 0.0 if is_rigid else values[Value.STRETCH + j]
                 force += values[Value.START + j]
-                slip += weight * (values[Value.TOTAL + j] - elastic)
+                slip += weight * (values[Value.TOTAL + j] - values[Value.STRETCH + j])
                 weights += weight
                 stored += values[Value.ENERGY + j]
 

@@ -145,6 +145,17 @@ class BondRow(IntEnum):
     IS_CONSTANT = 13 * WIDTH
 
 
+class ListRow(IntEnum):
+    """Rows of `numbers` of bonds that are summed one by one.
+
+    - FRICTION: coefficient of friction
+    - INDEX: number of the list of the point
+    """
+
+    FRICTION = 0
+    INDEX = WIDTH
+
+
 class Points(NamedTuple):
     """Points of p ports in b blocks; r shear coordinates of the pieces.
 

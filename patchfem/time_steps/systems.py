@@ -3,13 +3,17 @@
 import numpy as np
 
 from ..core import ModalBasis
-from ..friction.bonds.list_numbers import make_no_lists
+from ..friction.bonds.list_numbers import make_lists, make_no_lists
 from ..points import time_march
 from ..points.march_rows import RESULTANT, Options, Port, Ports, Shear, Structure, System, Total
-from .step_rows_kernels import N_VALUES, WIDTH, BondRow, Law, Points, Value
+from .step_rows_kernels import N_VALUES, WIDTH, BondRow, Law, ListRow, Points, Value
 
 # Lengths of the steps: whole ones, and those after up to seven halvings, by which a step that fails is retried
 N_LEVELS = 8
+MIN_RANK = (
+    1e-6  # smallest singular value, relative to the largest one, of ports that modes move apart
+)
+N_EVENT_LEVELS = 20  # the same with rigid friction, whose stops and releases are located by halving
 
 
 def make_system(
@@ -42,12 +46,15 @@ def make_system(
 
     # Responses of the modes; a prescribed slide has none.
     mass = 1.0
-    responses = time_march.Responses(*(np.zeros((N_LEVELS, k, 3)) for k in (0, 3, 3)))
+    is_rigid = [point_set.law.law == Law.COULOMB for point_set in contact.point_sets]
+    has_events = modes is not None and any(is_rigid)
+    levels = N_EVENT_LEVELS if has_events else N_LEVELS
+    responses = time_march.Responses(*(np.zeros((levels, k, 3)) for k in (0, 3, 3)))
     shape = np.zeros((3, 0))
     damping = np.zeros((0, 0))
     if modes is not None:
         mass = float(modes.mass)
-        responses = time_march.make_responses(modes, step, N_LEVELS)
+        responses = time_march.make_responses(modes, step, levels)
         shape = np.array([modes.omega**2, modes.base, modes.output], float)
         damping = np.array(modes.damping_matrix, float)
     by_force = responses.motion[:, :, 2 * n + 3 :]
@@ -60,7 +67,7 @@ def make_system(
     size = len(rows) + points.stiffness.size
     ports = Ports(
         rows,
-        np.array(compliance).reshape(N_LEVELS, 2, len(rows), len(rows)) / mass,
+        np.array(compliance).reshape(levels, 2, len(rows), len(rows)) / mass,
         rows @ rows.T / mass,
         _find_redundant(rows, contact),
         _make_port_values(contact, len(rows)),
@@ -77,8 +84,8 @@ def make_system(
         float(step),
         float(travel),
         max(float(contact.limit), 1e-300),
-        int((points.law == Law.COULOMB).any()),
-        0,
+        int(has_events),
+        int((points.law == Law.LIST).any()),
         int(contact.has_loads),
         0,
     )
@@ -86,10 +93,10 @@ def make_system(
     if start is not None:
         state[0] = [*start.z, *start.v]
     sets = time_march.make_no_sets() if contact.sets is None else contact.sets.make_arrays()
-    no_lists = make_no_lists(0)
+    lists = _make_lists(contact, points)
     flank = time_march.make_flank(contact)
     totals = np.zeros(len(Total))
-    system = System(structure, ports, points, no_lists, flank, sets, state, totals, options)
+    system = System(structure, ports, points, lists, flank, sets, state, totals, options)
     _set_start(system, contact)
     return system
 
@@ -112,8 +119,8 @@ def _set_start(system: System, contact) -> None:
     points.memory[is_spring, 0] = slides[is_spring]
     is_rigid = points.law == Law.COULOMB
     limits = points.numbers[:, WIDTH] * values[:, Value.END_LOAD // WIDTH, 0]
-    values[is_rigid, Value.END // WIDTH, 0] = (limits * np.sign(velocities))[is_rigid]
-    values[is_rigid, Value.STRETCH // WIDTH, 0] = (velocities == 0)[is_rigid]
+    points.memory[is_rigid, 0] = np.sign(velocities)[is_rigid]
+    values[is_rigid, Value.START // WIDTH, 0] = (limits * points.memory[:, 0])[is_rigid]
     if contact.sets is not None:
         time_march.press_first(system, contact)
     if contact.grooves is not None and n:
@@ -135,7 +142,7 @@ def _climb_first(system: System, contact) -> None:
 
 
 def _find_redundant(rows, contact) -> np.ndarray:
-    """Return the relative compliances (p,) of rigid ports, which are 0 unless ports outnumber the modes.
+    """Return the relative compliances (p,) of rigid ports, which are 0 unless the modes move some of them only together.
 
     Such ports share their forces by the modal forces at which they slip, so that they reach their limits at once.
 
@@ -146,19 +153,19 @@ def _find_redundant(rows, contact) -> np.ndarray:
     contact : contacts.Contact
         Points of the first ports, with their loads at the start.
     """
-    count, n = rows.shape
-    redundant = np.zeros(count)
-    is_rigid = np.zeros(count, bool)
-    laws = [point_set.law.law for point_set in contact.point_sets]
-    is_rigid[: len(laws)] = [law == Law.COULOMB for law in laws]
-    if is_rigid.sum() <= n:
+    redundant = np.zeros(len(rows))
+    sets = contact.point_sets
+    rigid = [p for p, point_set in enumerate(sets) if contact.is_rigid(point_set)]
+    if not rigid or not rows.size:
         return redundant
-    limits = [point_set.law.limits.sum() for point_set in contact.point_sets]
-    strength = np.array(limits) * np.linalg.norm(rows[: len(limits)], axis=1)
-    largest = strength[is_rigid[: len(limits)]].max(initial=0.0)
-    share = strength / largest if largest > 0 else np.ones(len(limits))
-    redundant[: len(limits)] = time_march.REDUNDANT / np.maximum(share, time_march.MIN_STRENGTH)
-    return redundant * is_rigid
+    values = np.linalg.svd(rows[rigid], compute_uv=False)
+    if values.size == len(rigid) and values[-1] > MIN_RANK * values[0]:
+        return redundant
+    strength = np.array([sets[p].law.limits.sum() * np.linalg.norm(rows[p]) for p in rigid])
+    largest = strength.max()
+    share = strength / largest if largest > 0 else np.ones(len(rigid))
+    redundant[rigid] = time_march.REDUNDANT / np.maximum(share, time_march.MIN_STRENGTH)
+    return redundant
 
 
 def find_stiffness(point_set) -> float:
@@ -175,12 +182,10 @@ def find_stiffness(point_set) -> float:
 
 
 def _make_port_values(contact, n_ports: int) -> np.ndarray:
-    """Return the rows of the ports, with stiffness and viscosity of their points at rest in series with the pieces."""
+    """Return the rows of the ports, with the viscosity of their points at rest."""
     values = np.zeros((len(Port), n_ports))
     for p, point_set in enumerate(contact.point_sets):
-        law = point_set.law
-        values[Port.VISCOSITY, p] = law.viscosity.sum()
-        values[Port.STIFFNESS, p] = find_stiffness(point_set)
+        values[Port.VISCOSITY, p] = point_set.law.viscosity.sum()
     return values
 
 
@@ -256,6 +261,18 @@ def _make_points(contact, n_ports: int) -> Points:
         np.zeros(1),
         np.zeros((stiffness.size, 2)),
     )
+
+
+def _make_lists(contact, points: Points):
+    """Return the lists of bonds (`strip_rows_kernels.BondLists`), and number the points that have one."""
+    is_list = points.law == Law.LIST
+    if not is_list.any():
+        return make_no_lists(0)
+    is_used = is_list[:, None] & (np.arange(WIDTH) < points.count[:, None])
+    indices = points.numbers[:, ListRow.INDEX : ListRow.INDEX + WIDTH]
+    indices[is_used] = np.arange(is_used.sum())
+    loads = points.values[:, Value.END_LOAD : Value.END_LOAD + WIDTH]
+    return make_lists(*contact.bond_sum, loads[is_used])
 
 
 def _count_memory(sets, blocks) -> np.ndarray:

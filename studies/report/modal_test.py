@@ -17,7 +17,8 @@ from patchfem.hybrid import runs
 from patchfem.hybrid.cases import EXACT_RTOL, Schedule, make_rig_case
 from patchfem.points.time_march import march
 from patchfem.runs import choose_numerics, solve_with_coarser
-from patchfem.runs.rig.joints import make_contact, make_joints
+from patchfem.runs.rig.contact_points import make_contact
+from patchfem.runs.rig.joints import make_joints
 from patchfem.structure.drives import RecordedDrive
 
 G = 9.80665  # [m/s^2] standard gravity

@@ -1,4 +1,4 @@
-"""Random rigs as models, computed by one or the other march of contact points.
+"""Random rigs as models, computed by the march of contact points.
 
 The rigs are those of `random_rigs.json`, with the measures of an independent program, and further ones that a seed draws,
 with those of the event-driven engine. A spec becomes the model of a scene with a mass for each
@@ -6,11 +6,9 @@ mode and an interface for each face, whose modes, drive and start are then those
 follow the motion, and loads that oscillate at one of several faces have no keys in a scene.
 """
 
-from contextlib import contextmanager
 from dataclasses import replace
 from time import process_time
 from typing import NamedTuple
-from unittest import mock
 
 import numpy as np
 from campaigns import Row, measure_rows
@@ -18,7 +16,6 @@ from random_rigs import RIGS, ZERO
 
 from patchfem.api import build, run
 from patchfem.core import InitialState, ModalBasis, PatchfemError
-from patchfem.runs.rig import contact_points
 from patchfem.scene import loads
 from patchfem.scene.scene import SceneError
 from patchfem.structure.drives import RecordedDrive
@@ -152,25 +149,17 @@ def make_model(spec: dict, accuracy: str = ""):
     return replace(model, rig=rig)
 
 
-@contextmanager
-def choose_march(name: str):
-    """Let rigs run in the march of `time_steps` or `points`, whatever their law."""
-    with mock.patch.object(contact_points, "_needs_points", lambda *inputs: name == "points"):
-        yield
-
-
-def score_run(model, march: str, truths: dict, doubts: dict) -> Score:
-    """Return the rows of a run of a model by a march beside references."""
+def score_run(model, truths: dict, doubts: dict) -> Score:
+    """Return the rows of a run of a model beside references."""
     begin = process_time()
     try:
-        with choose_march(march):
-            result = run(model, say=lambda line: None)
+        result = run(model, say=lambda line: None)
     except Exception as error:  # a fault of the program is a row of the report
         return Score([], process_time() - begin, f"{type(error).__name__}: {error}")
     return Score(measure_rows(result.measures, truths, doubts), process_time() - begin)
 
 
-def score_rig(name: str, march: str, tolerance: float = 1e-2) -> Score:
+def score_rig(name: str, tolerance: float = 1e-2) -> Score:
     """Return the rows of a stored random rig beside its references.
 
     The amplitude of a release and the sticking of a law that creeps have another definition in the references.
@@ -189,10 +178,10 @@ def score_rig(name: str, march: str, tolerance: float = 1e-2) -> Score:
         for key, value in true.items()
     }
     model = make_model(spec, f'tolerance = {tolerance}\nmethod = "march"\n')
-    return score_run(model, march, true, doubts)
+    return score_run(model, true, doubts)
 
 
-def score_drawn_rig(spec: dict, march: str, tolerance: float = 1e-2) -> Score | None:
+def score_drawn_rig(spec: dict, tolerance: float = 1e-2) -> Score | None:
     """Return the rows of a spec beside the measures of the event-driven engine; None if it cannot compute the spec."""
     try:
         exact = make_model(spec, 'tolerance = 1e-4\nmethod = "exact"\n')
@@ -207,7 +196,7 @@ def score_drawn_rig(spec: dict, march: str, tolerance: float = 1e-2) -> Score | 
     truths = {name: measure.value for name, measure in known.items()}
     doubts = {name: measure.error for name, measure in known.items()}
     model = make_model(spec, f'tolerance = {tolerance}\nmethod = "march"\n')
-    return score_run(model, march, truths, doubts)
+    return score_run(model, truths, doubts)
 
 
 # ---- drawn rigs

@@ -14,11 +14,6 @@ from patchfem.scene import loads
 FIRST_SEED = 20264501
 N_DRAWN = 60
 MIN_SHARE = 0.98  # of the rows whose error holds
-# To be removed with the mend of each
-MISSING = pytest.mark.xfail(
-    reason="Bouc-Wen with shape < 1/2 loses the energy that it creates; LuGre stores another energy than in engine "
-    "exact; a step with several rigid ports has no solution"
-)
 
 
 def assert_share_holds(found: dict) -> None:
@@ -30,24 +25,19 @@ def assert_share_holds(found: dict) -> None:
     assert len(misses) <= (1 - MIN_SHARE) * len(rows), misses
 
 
-@MISSING
 @pytest.mark.slow
 def test_stored_rigs():
     """Rigs of an independent program."""
     names = [name for name, case in RIGS.items() if not march_rigs.find_missing_key(case["spec"])]
-    assert_share_holds({name: march_rigs.score_rig(name, "time_steps") for name in names})
+    assert_share_holds({name: march_rigs.score_rig(name) for name in names})
 
 
-@MISSING
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
 def test_drawn_rigs(tolerance):
     """Rigs that a seed draws, beside the event-driven engine."""
     specs = {seed: march_rigs.draw_spec(seed) for seed in range(FIRST_SEED, FIRST_SEED + N_DRAWN)}
-    found = {
-        seed: march_rigs.score_drawn_rig(spec, "time_steps", tolerance)
-        for seed, spec in specs.items()
-    }
+    found = {seed: march_rigs.score_drawn_rig(spec, tolerance) for seed, spec in specs.items()}
     assert_share_holds({seed: score for seed, score in found.items() if score is not None})
 
 
@@ -57,11 +47,11 @@ def test_patches_on_rigs():
     references = json.loads(scores.MARCH_REFERENCES.read_text("utf-8"))
     found = {}
     for scene in march_recipe.make_scenes():
-        if scene.kind == "rig" and (scene.law, scene.effect) != ("coulomb", "shear and pitch"):
+        if scene.kind == "rig":
             text = scene.text if "[accuracy]" in scene.text else f"{scene.text}[accuracy]\n"
             model = build(loads(f'{text}method = "march"\n'))
             reference = references[str(scene.seed)]
             found[scene.seed] = march_rigs.score_run(
-                model, "time_steps", reference["values"], reference["doubts"]
+                model, reference["values"], reference["doubts"]
             )
     assert_share_holds(found)

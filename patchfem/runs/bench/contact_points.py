@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import friction
+from ... import friction, points
 from ...core import MIN_LOAD
 from ...effects import law_has_trait, law_takes_stiffness_or_length, needs_bond_list
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED
 from ...points.march_rows import LOWER
+from ...slip import shear_modes
 from ...time_steps import contacts, laws, systems
 from ..patch import store
 from . import shear
@@ -25,14 +26,12 @@ from . import shear
 # Largest number of shear modes of laws whose points have the compliance of the modes left out: for Coulomb's law the loop
 # area then has an error of 5e-4
 MAX_MODES = 16
-# Smallest compliance in series with rigid friction at a node, relative to that of the node. All modes of a few nodes leave
-# none out, and the march solves rigid friction only at whole ports. It changes amplitudes by up to 5e-4.
-MIN_NEGLECTED = 1e-2
-MEMORY_LAWS = (
-    "iwan",
-    "bouc-wen",
-    "lugre",
-)  # laws of which `points` knows only one point under a constant load
+# First and last slide over which the steepest fall of a friction force is sought, relative to the smallest and the largest
+# length of the law; with 400 samples the fall is known to 0.3 %.
+FALL_RANGE = (1e-2, 20.0)
+N_FALL_SAMPLES = 400
+# Largest growth of the bonds at rest during that slide, relative to the whole growth.
+MAX_FALL_GROWTH = 1e-8
 
 
 class LowerPlaces(NamedTuple):
@@ -57,6 +56,7 @@ class Surface(NamedTuple):
     - has_half_cells: whether an Iwan model has half of its cells, to estimate their error
     - rise: load of the points at the start over their mean load
     - lower: LowerPlaces if the pressure belongs to the lower piece, or None
+    - bond_sum: sum over lists of bonds, or None
     """
 
     keys: object
@@ -67,6 +67,7 @@ class Surface(NamedTuple):
     has_half_cells: bool = False
     rise: float = 1.0
     lower: LowerPlaces | None = None
+    bond_sum: object = None
 
 
 def sums_over_lists(model) -> bool:
@@ -84,41 +85,23 @@ def sums_over_lists(model) -> bool:
     return not changes and model.accuracy.quadrature not in ("auto", "recursion")
 
 
-def needs_time_steps(model, *, is_soft: bool, varies: bool) -> bool:
-    """Return whether only the march of `time_steps` has the law of an interface beside its other effects.
-
-    The march of `points` computes what it can, because its errors have been compared with other programs on more random
-    rigs.
+def make_bond_sum(model, choice):
+    """Return the settings of a sum over lists of bonds (`points.contacts.BondSum`); None without a list.
 
     Parameters
     ----------
     model : Model
-        Model of a bench or a rig.
-    is_soft : bool
-        Whether the pieces of an interface deform in shear.
-    varies : bool
-        Whether the load changes in time, or by heave and pitch.
+        Model with the law of the bonds.
+    choice : EngineChoice or None
+        Method of bond summation.
     """
-    keys = model.friction
-    if sums_over_lists(model):
-        return False
-    if model.grooves is not None:
-        return True
-    if model.side == "lower" and not law_has_trait(keys.law, "bonds"):
-        return True
-    if keys.law in MEMORY_LAWS:
-        return varies or is_soft
-    if law_has_trait(keys.law, "averaged"):
-        return varies
-    if law_has_trait(keys.law, "set-valued"):
-        return varies and is_soft
-    if law_has_trait(keys.law, "memoryless"):
-        return is_soft
-    is_fixed = keys.stiffness is not None and law_takes_stiffness_or_length(keys.law)
-    return is_fixed and varies
+    if choice is None or choice.engine == "recursion":
+        return None
+    law = model.bonds
+    return points.contacts.BondSum(law, choice.reach(law.order), choice.merge)
 
 
-def make_contact(model, patch, *, has_half_cells: bool = False) -> contacts.Contact:
+def make_contact(model, patch, choice=None, *, has_half_cells: bool = False):
     """Return the contact points of a bench.
 
     Parameters
@@ -127,21 +110,53 @@ def make_contact(model, patch, *, has_half_cells: bool = False) -> contacts.Cont
         Model of a bench.
     patch : Patch or None
         None for a single point.
+    choice : EngineChoice, optional
+        Method of a sum over lists of bonds.
     has_half_cells : bool
         Whether an Iwan model has half of its cells.
+
+    Returns
+    -------
+    time_steps.contacts.Contact or, with lists, points.contacts.Contact
     """
     fields = find_load_fields(model, patch)
     force = np.array([model.point.load if patch is None else 0.0])
     if patch is not None:
         force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    soft = patch if model.partial_slip else None
-    surface = Surface(model.friction, float(force.sum()), force, soft, np.zeros(0), has_half_cells)
+    surface = Surface(
+        model.friction,
+        float(force.sum()),
+        force,
+        patch if model.partial_slip else None,
+        np.zeros(0),
+        has_half_cells,
+        bond_sum=make_bond_sum(model, choice),
+    )
     surface = place_surface(model, patch, surface)
-    points = make_points(model, surface)
     limit = model.friction.static * float(force.sum())
     if model.grooves is not None:
         limit = model.grooves.max_force(fields["preload"], model.friction.static)
-    return contacts.Contact([points], limit, find_length(points), **fields)
+    return join_points([make_points(model, surface)], limit, surface.bond_sum, fields)
+
+
+def join_points(point_sets, limit: float, bond_sum, fields: dict):
+    """Return the Contact of some sets of points, the first of which are interfaces.
+
+    Parameters
+    ----------
+    point_sets : list of PointSet
+        Interfaces, then springs.
+    limit : float
+        Friction limit of all interfaces [N].
+    bond_sum : BondSum or None
+        Sum over lists of bonds, which only the march of `points` has.
+    fields : dict
+        Fields of a Contact that describe the load.
+    """
+    if bond_sum is not None:
+        length = bond_sum.bonds.length
+        return points.contacts.Contact(point_sets, limit, length, bond_sum=bond_sum, **fields)
+    return contacts.Contact(point_sets, limit, _find_length(point_sets), **fields)
 
 
 def place_surface(model, patch, surface: Surface) -> Surface:
@@ -241,11 +256,12 @@ def make_points(
     modes = _choose_modes(model, surface, law, n_modes, moves=moves)
 
     # Rigid friction and that of a speed have the compliance of the modes left out.
-    own = shear.find_own_compliance(surface.soft)[modes.points]
-    neglected = own - (modes.shape**2 / modes.stiffness).sum(axis=1)
-    least = MIN_NEGLECTED if law_has_trait(keys.law, "set-valued") else 0.0
-    points = _make_law_points(surface, law, force[modes.points], np.maximum(neglected, least * own))
-    return _make_point_set(surface, points, modes.points if moves else None, modes)
+    own = 0.0
+    if keys.law in laws.STIFF_LAWS:
+        diagonal = shear.find_own_compliance(surface.soft)[modes.points]
+        modes, own = shear_modes.share_rest(modes, diagonal)
+    point_law = _make_law_points(surface, law, force[modes.points], own)
+    return _make_point_set(surface, point_law, modes.points if moves else None, modes)
 
 
 def _choose_modes(model, surface: Surface, law, n_modes: int | None, *, moves: bool):
@@ -279,7 +295,12 @@ def _choose_modes(model, surface: Surface, law, n_modes: int | None, *, moves: b
         elif is_below:
             weight = np.maximum(force, shear.UNLOADED_NODE_PRESSURE_FRACTION * force.mean())
         length = getattr(law, "length", None) or 0.0
-        fall = shear.find_steepest_fall(law) if law_has_trait(keys.law, "bonds") else 0.0
+        fall = find_steepest_fall(law) if law_has_trait(keys.law, "bonds") else 0.0
+        if fall and (moves or is_below):
+            # A patch that could jump without a change of the drive is rejected under its pressure at the start.
+            first = shear.Softness(length, fall)
+            shear.choose_modes(surface.soft, keys.static * force, first, 1, tolerance)
+            fall = 0.0
         most = MAX_MODES if keys.law in laws.STIFF_LAWS else shear.MAX_MODES
         softness = shear.Softness(length, fall, most)
         return shear.choose_modes(surface.soft, keys.static * weight, softness, count, tolerance)
@@ -288,21 +309,52 @@ def _choose_modes(model, surface: Surface, law, n_modes: int | None, *, moves: b
     return store.get_or_compute(key, compute)
 
 
-def _make_point_set(surface: Surface, points, nodes=None, modes=None) -> contacts.PointSet:
+def find_steepest_fall(law) -> float:
+    """Return the steepest fall of the friction force of a law over the slip, relative to the friction limit [1/m].
+
+    It is that of the first slip of a point, which is so fast that its bonds do not grow at rest: a slower slip lets the
+    force fall less, and a sudden one leaves no time. It is 0 for a law without growth, whose force does not fall.
+
+    Parameters
+    ----------
+    law : Bonds
+        Friction law of a point.
+    """
+    if not law.has_growth:
+        return 0.0
+    scales = (law.length, law.slip_growth)
+    first = FALL_RANGE[0] * min(scales)
+    slide = np.append(0.0, np.geomspace(first, FALL_RANGE[1] * max(scales), N_FALL_SAMPLES))
+
+    # A step of duration t grows the bonds by a_s t^2/h over its slide h, relative to their whole growth.
+    growth = max(law.rest_growth, np.finfo(float).tiny) * np.sum(1 / np.diff(slide))
+    time = np.sqrt(MAX_FALL_GROWTH / growth) * np.arange(slide.size)
+    bond_sum = None
+    point_law = laws.make_bonds(law, 1.0)
+    if law.order != 1 or law.reading != "stretch":
+        bond_sum = points.contacts.BondSum(law, np.inf, 0.0)
+        point_law = points.laws.make_list(law, np.ones(1))
+    point_sets = [contacts.PointSet(point_law, np.zeros(0))]
+    contact = join_points(point_sets, law.static, bond_sum, {})
+    force = points.slides.follow(contact, time, slide).force / law.static
+    return max(0.0, float(-(np.diff(force) / np.diff(slide)).min()))
+
+
+def _make_point_set(surface: Surface, law, nodes=None, modes=None) -> contacts.PointSet:
     """Return the points of a surface as a PointSet, at their places over the lower piece if that has the pressure.
 
     Parameters
     ----------
     surface : Surface
         Surface of the points.
-    points : laws.PointLaw
+    law : laws.PointLaw
         Law of m points.
     nodes : (m,) array, optional
         Nodes whose forces are the loads of the points.
     modes : ShearModes, optional
         Shear of the pieces.
     """
-    point_set = contacts.PointSet(points, surface.row, nodes, modes)
+    point_set = contacts.PointSet(law, surface.row, nodes, modes)
     if surface.lower is None:
         return point_set
     x, shares = surface.lower
@@ -310,7 +362,9 @@ def _make_point_set(surface: Surface, points, nodes=None, modes=None) -> contact
         x = x[modes.points]
         shares = shares[modes.points]
     below = {"nodes": np.full(x.size, LOWER), "shares": shares, "places": x}
-    return replace(point_set, law=laws.keep_loads(points), **below)
+    if surface.bond_sum is None:
+        law = laws.keep_loads(law)
+    return replace(point_set, law=law, **below)
 
 
 def _make_law_points(surface: Surface, law, mean, compliance=0.0) -> laws.PointLaw:
@@ -329,16 +383,20 @@ def _make_law_points(surface: Surface, law, mean, compliance=0.0) -> laws.PointL
     """
     keys = surface.keys
     load = surface.rise * mean
+    if surface.bond_sum is not None:
+        return points.laws.make_list(law, np.atleast_1d(load))
     if keys.stiffness and law_takes_stiffness_or_length(keys.law):
-        points = laws.make_cells(law.static, law.length, mean, is_fixed=True)
-        return points._replace(load=np.broadcast_to(load, points.load.shape))
+        cells = laws.make_cells(law.static, law.length, mean, is_fixed=True)
+        return cells._replace(load=np.broadcast_to(load, cells.load.shape))
     if keys.law == "iwan":
         n_cells = laws.N_CELLS // 2 if surface.has_half_cells else laws.N_CELLS
         return laws.make_iwan(law, np.maximum(load, MIN_LOAD), n_cells)
     return laws.make_point_law(keys.law, law, load, compliance)
 
 
-def find_length(point_set: contacts.PointSet) -> float:
-    """Return the displacement [m] over which an interface stretches before it slips; 0 for a rigid one."""
-    stiffness = systems.find_stiffness(point_set)
-    return float(point_set.law.limits.sum() / stiffness) if stiffness else 0.0
+def _find_length(point_sets) -> float:
+    """Return the displacement [m] over which the first interface stretches before it slips; 0 for a rigid one."""
+    if not point_sets or point_sets[0].is_spring:
+        return 0.0
+    stiffness = systems.find_stiffness(point_sets[0])
+    return float(point_sets[0].law.limits.sum() / stiffness) if stiffness else 0.0

@@ -378,22 +378,21 @@ def _make_contact(task: SlideTask):
     friction = model.friction
     engine = task.engine
     row = np.zeros(0)
-    if engine.choice is not None:
-        return shear.make_points(model, task.patch, row, engine.choice), None
-
     # Pieces that deform in shear are parallel Jenkins elements of the same slip curve.
     if engine.method == PARALLEL_ELEMENTS and model.partial_slip:
         length = make_law(friction).length
         jenkins_set = jenkins_elements.elements(task.patch, friction.static, length)
         yields = jenkins_set.yield_displacement
         law = time_steps.laws.make_elements(jenkins_set.stiffness, yields)
-        point_set = time_steps.contacts.PointSet(law, row)
-        return time_steps.contacts.Contact([point_set], float(law.limits.sum())), jenkins_set
+        point_sets = [contacts.PointSet(law, row)]
+        limit = float(law.limits.sum())
+        return contact_points.join_points(point_sets, limit, None, {}), jenkins_set
 
     # Masing's rule has no error of cells.
     if engine.method == PARALLEL_ELEMENTS and law_has_trait(friction.law, "cells"):
         load = float(task.evaluate_pressure([0])[0] @ task.weight)
         law = make_point_law(friction.law, make_law(friction, load), load)
-        return contacts.make_contact([law], [row]), None
+        return contacts.Contact([contacts.PointSet(law, row)], friction.static * load), None
     half = engine.has_half_cells
-    return contact_points.make_contact(model, task.patch, has_half_cells=half), None
+    contact = contact_points.make_contact(model, task.patch, engine.choice, has_half_cells=half)
+    return contact, None

@@ -9,25 +9,25 @@ from __future__ import annotations
 
 import numpy as np
 
+from ... import points
 from ...contact import contact_sets
-from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega
 from ...time_steps import laws
-from ...time_steps.contacts import Contact, PointSet
+from ...time_steps.contacts import PointSet
 from ..bench.contact_points import (
     Surface,
-    find_length,
     find_load_fields,
+    join_points,
+    make_bond_sum,
     make_points,
-    needs_time_steps,
     place_surface,
 )
 from ..patch import faces
 from . import bands, bond_lists, joints
 
 
-def make_contact(model: Model, numerics, patch) -> Contact:
+def make_contact(model: Model, numerics, patch):
     """Return the contact points of a march, with all interfaces and nonlinear springs.
 
     Parameters
@@ -39,21 +39,24 @@ def make_contact(model: Model, numerics, patch) -> Contact:
     patch : Patch or None
         None under [normal] and between masses.
     """
-    if _needs_points(model, numerics):
-        return joints.make_contact(model, numerics, patch)
     rig = model.rig
     rows = rig.modes.interfaces
+    bond_sum = None
+    makers = laws
+    if bond_lists.has_bond_list(model, numerics):
+        bond_sum = make_bond_sum(model, bond_lists.choose_bond_summation(model, numerics))
+        makers = points.laws
     springs = []
     if rig.springs.interlock is not None:
-        law = laws.make_interlocking(*rig.springs.interlock)
+        law = makers.make_interlocking(*rig.springs.interlock)
         springs.append(PointSet(law, rows[0], is_spring=True))
     if rig.springs.cubic is not None:
-        springs.append(
-            PointSet(laws.make_cubic(rig.springs.cubic), rig.modes.output, is_spring=True)
-        )
+        law = makers.make_cubic(rig.springs.cubic)
+        springs.append(PointSet(law, rig.modes.output, is_spring=True))
+
     fields = {}
     sets = []
-    if model.rig.friction.interfaces:
+    if rig.friction.interfaces:
         fields = _find_load(model, patch)
         found = _list_element_joints(model, numerics, patch) if not fields else []
         sets = [PointSet(joint.make_step_law(), row) for joint, row in zip(found, rows)]
@@ -61,8 +64,8 @@ def make_contact(model: Model, numerics, patch) -> Contact:
             fields["elements"] = found[0].reduction
         if not sets:
             surfaces = _list_surfaces(model, numerics, patch)
-            if numerics.has_half_cells:
-                surfaces = [part._replace(has_half_cells=True) for part in surfaces]
+            how = {"has_half_cells": numerics.has_half_cells, "bond_sum": bond_sum}
+            surfaces = [part._replace(**how) for part in surfaces]
             moves = "sets" in fields
             count = numerics.shear_modes
             sets = [make_points(model, part, count, moves=moves) for part in surfaces]
@@ -71,26 +74,7 @@ def make_contact(model: Model, numerics, patch) -> Contact:
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     if model.grooves is not None:
         limit = model.grooves.max_force(fields["preload"], model.friction.static)
-    length = find_length(sets[0]) if sets else 0.0
-    return Contact([*sets, *springs], limit or scale, length, **fields)
-
-
-def _needs_points(model: Model, numerics) -> bool:
-    """Return whether the march of `points` computes a model, and not that of `time_steps`.
-
-    Bonds behind elastic pieces of several interfaces need `time_steps` too, unless they are summed over lists.
-    """
-    if model.friction is None:
-        return True
-    friction = model.rig.friction
-    is_soft = bool(model.partial_slip or friction.has_partial_slip)
-    if needs_time_steps(model, is_soft=is_soft, varies=friction.load_varies):
-        return False
-    has_bonds = law_has_trait(model.friction.law, "bonds")
-    if not (has_bonds and is_soft and len(friction.interfaces) > 1):
-        return True
-    is_listed = bond_lists.choose_bond_summation(model, numerics).engine != "recursion"
-    return is_listed or model.side == "lower"
+    return join_points([*sets, *springs], limit or scale, bond_sum, fields)
 
 
 def _find_load(model: Model, patch) -> dict:

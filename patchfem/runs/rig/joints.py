@@ -7,12 +7,11 @@ A patch that slips part by part under a constant load is its exact set of Jenkin
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ... import friction, points, slip, time_steps
+from ... import friction, slip, time_steps
 from ...core import PatchfemError
 from ...effects import law_has_trait, law_supports
 from ...hybrid import laws as hybrid_laws
@@ -23,8 +22,7 @@ from ...hybrid.records import LawNumbers
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
 from ...model.structure import N_YAW_BANDS
-from ...structure.drive_sizes import find_drive_omega
-from ..bench import averaged_law, shear
+from ..bench import averaged_law
 from ..patch import area_slip, faces, jenkins_elements
 from . import bands, bond_lists
 from .numerics import Numerics
@@ -77,12 +75,6 @@ class Joint(NamedTuple):
             return self.make_law().length
         total = self.stiffness.sum()
         return float(self.stiffness @ self.yields / total) if total > 0 else 0.0
-
-    def make_point_law(self) -> points.laws.PointLaw:
-        """Return the law under its mean load as a PointLaw, the form for the time integration with equal steps."""
-        if self.stiffness is not None:
-            return points.laws.make_elements(self.stiffness, self.yields)
-        return points.laws.make_point_law(self.law.law, self.make_law(), self.load.mean)
 
     def make_step_law(self):
         """Return the law under its mean load as a `time_steps.laws.PointLaw`."""
@@ -296,42 +288,6 @@ def _find_stick_tolerance(joints, laws) -> float:
 
 
 # ---- march, and motions without a drive
-
-
-def make_contact(model: Model, numerics: Numerics, patch) -> points.contacts.Contact:
-    """Return the contact points of a time integration, with all interfaces and nonlinear springs.
-
-    Parameters
-    ----------
-    model : Model
-        Rig, springs and friction laws.
-    numerics : Numerics
-        Numbers of shear modes, method of bond summation and coarser meshes.
-    patch : Patch or None
-        None under [normal].
-    """
-    rig = model.rig
-    rows = rig.modes.interfaces
-    springs = []
-    if rig.springs.interlock is not None:
-        springs.append(points.contacts.make_interlocking_spring(*rig.springs.interlock, rows[0]))
-    if rig.springs.cubic is not None:
-        springs.append(points.contacts.make_cubic_spring(rig.springs.cubic, rig.modes.output))
-
-    # The points of a single interface may have bonds or a load that changes.
-    if len(rows) == 1 and model.friction is not None:
-        has_bonds = law_has_trait(model.friction.law, "bonds")
-        if has_bonds or rig.friction.load_varies:
-            choice = bond_lists.choose_bond_summation(model, numerics) if has_bonds else None
-            contact = shear.make_points(model, patch, rows[0], choice, numerics.shear_modes)
-            return replace(contact, point_sets=[*contact.point_sets, *springs])
-
-    joints = list_joints(model, patch, numerics.meshed)
-    laws = [joint.make_point_law() for joint in joints]
-    scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
-    length = joints[0].length if joints else 0.0
-    contact = points.contacts.make_contact(laws, rows[: len(joints)], springs, scale, length)
-    return replace(contact, elements=joints[0].reduction) if len(joints) == 1 else contact
 
 
 def _has_bond_list(model: Model, numerics: Numerics) -> bool:

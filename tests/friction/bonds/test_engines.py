@@ -14,7 +14,7 @@ from patchfem import build
 from patchfem.friction import Bonds
 from patchfem.runs import choose_numerics as settings_of
 from patchfem.runs.rig.bond_lists import choose_bond_summation
-from patchfem.runs.rig.joints import make_contact
+from patchfem.runs.rig.contact_points import make_contact
 from patchfem.scene import scene
 
 TEXT = (
