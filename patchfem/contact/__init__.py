@@ -37,8 +37,8 @@ PUBLIC = {
     "edges": (
         "MIN_CONTACT_PRESSURE_RATIO",
         "ContactEdges",
+        "QUADRATIC_EDGE_OFFSET_FRACTION",
         "EdgeCells",
-        "contact_intervals",
         "compute_edge_offset",
         "find_edges",
         "find_intervals",

@@ -24,28 +24,12 @@ MAX_CELL_ASPECT = 4.0
 QUADRATIC_EDGE_OFFSET_FRACTION = 0.345
 
 
-class ContactEdge(NamedTuple):
-    """End of the contact region, which lies between two nodes of the interface.
-
-    - node: Last node in contact.
-    - side: 1 where the contact ends towards +x, else -1.
-    - fraction: Fraction of the cell beyond that the edge has passed: 0 as the node enters and 1 as the next
-      one does.
-    - position: Position of the edge [m].
-    """
-
-    node: int
-    side: int
-    fraction: float
-    position: float
-
-
 def compute_edge_offset(
-    inner, outer, fraction, row_height: float | None = None, *, is_quadratic: bool = False
+    inner, outer, fraction, row_height: float | None = None, offset: float | None = None
 ):
     """Return the inward offset [m] of an edge from the position that follows from its cell fraction.
 
-    The edge lies inside the position that `ContactEdge.fraction` gives. In cell lengths, the offset decreases with the
+    The edge lies inside the position that the fraction gives. In cell lengths, the offset decreases with the
     aspect of the cell, the height of the first row over its length: first with its square and then in proportion. The
     three numbers fit Hertz contact on 35 meshes of aspects 1/8 to 4 within 0.0005; each of these is known to 0.003.
 
@@ -60,43 +44,14 @@ def compute_edge_offset(
         Fraction of the outer cell.
     row_height : float, optional
         Height of the first row of cells [m]; square cells without it.
-    is_quadratic : bool
-        Whether the cells are of second order.
+    offset : float, optional
+        Offset in cell lengths of cells whose offset does not depend on their aspect.
     """
     cell = (1 - fraction) * inner + fraction * outer
-    if is_quadratic:
-        return QUADRATIC_EDGE_OFFSET_FRACTION * cell
+    if offset is not None:
+        return offset * cell
     aspect = np.minimum(1.0 if row_height is None else row_height / cell, MAX_CELL_ASPECT)
     return (0.3048 - 0.0818 * aspect**2 / (1 + 0.585 * aspect)) * cell
-
-
-def _find_ends(active: np.ndarray) -> list[tuple[int, int]]:
-    """Return (node, side) of each end of the contact set (m,) inside the interface.
-
-    The node is the last one in contact. The side is 1 where the contact ends towards +x, else -1.
-    """
-    return [
-        (int(change), 1) if active[change] else (int(change) + 1, -1)
-        for change in np.flatnonzero(active[1:] != active[:-1])
-    ]
-
-
-def compute_edge_fraction(force: float, force_rate: float, gap: float, gap_rate: float) -> float:
-    """Return the fraction of a cell that an edge has passed, or 1/2 if it is undetermined.
-
-    Parameters
-    ----------
-    force, force_rate : float
-        Force of the last node in contact [N] and its increase per approach [N/m].
-    gap, gap_rate : float
-        Gap at the next node [m] and its decrease per approach [1].
-    """
-    if not (force_rate > 0 and gap_rate > 0):
-        return 0.5
-    approach_since_entry = force / force_rate
-    approach_to_next = gap / gap_rate
-    total = approach_since_entry + approach_to_next
-    return float(approach_since_entry / total) if total > 0 else 0.5
 
 
 class ContactEdges(NamedTuple):
@@ -118,23 +73,18 @@ class ContactEdges(NamedTuple):
         """Whether there is an edge (n, e)."""
         return self.side != 0
 
-    def list_edges(self, row: int) -> list[ContactEdge]:
-        """Return the edges of one set by increasing x."""
-        fields = zip(*(field[row][self.side[row] != 0].tolist() for field in self))
-        return [ContactEdge(*field) for field in fields]
-
 
 class EdgeCells(NamedTuple):
     """Properties of the cells of an interface that displace an edge between two nodes.
 
     - row_height: height of the first row of cells [m].
-    - is_quadratic: whether the cells are of second order.
+    - offset: inward offset of an edge in cell lengths; None if it follows from the aspect of the cells.
     - layer_fraction (m,): fraction of the compliance of a node that is due to an asperity layer, which has its edge at the
       node itself; None without a layer.
     """
 
     row_height: float | None = None
-    is_quadratic: bool = False
+    offset: float | None = None
     layer_fraction: np.ndarray | None = None
 
 
@@ -176,45 +126,11 @@ def find_edges(x, active, unknown, rate, cells: EdgeCells) -> ContactEdges:
             np.abs(cell),
             fraction,
             cells.row_height,
-            is_quadratic=cells.is_quadratic,
+            cells.offset,
         )
         if cells.layer_fraction is not None:
             offset = offset * (1 - cells.layer_fraction[node])
     return ContactEdges(node, side, fraction, x[node] + fraction * cell - side * offset)
-
-
-def place_edges(x, force, gap, force_rate, gap_rate, compute_offset) -> list[ContactEdge]:
-    """Place the edges of a contact set between its nodes.
-
-    Parameters
-    ----------
-    x, force, gap : (m,) ndarray
-        Positions [m], forces [N] and gap under load [m].
-    force_rate, gap_rate : (m,) ndarray
-        Increase of the forces [N/m] and decrease of the gaps per approach.
-    compute_offset : callable
-        Function of the last node, the lengths [m] of its cells inside and outside, and the fraction of the latter
-        that returns the inward offset [m] of the edge.
-
-    Returns
-    -------
-    list of ContactEdge
-        By increasing x.
-    """
-    edges = []
-    for node, side in _find_ends(force > 0):
-        outside = node + side
-        inside = node - side
-        if not 0 <= inside < x.size:
-            inside = outside
-        fraction = compute_edge_fraction(
-            force[node], force_rate[node], gap[outside], gap_rate[outside]
-        )
-        cell = x[outside] - x[node]
-        offset = compute_offset(node, abs(x[node] - x[inside]), abs(cell), fraction)
-        position = x[node] + fraction * cell - side * offset
-        edges.append(ContactEdge(node, side, fraction, float(position)))
-    return edges
 
 
 def snap_to_steps(edges: ContactEdges, x, gap, step_positions) -> ContactEdges:
@@ -283,18 +199,7 @@ def find_pressure_edges(x, pressure, threshold) -> ContactEdges:
     return ContactEdges(node, side, fraction, position)
 
 
-class ContactIntervals(NamedTuple):
-    """Intervals in contact of n sets: their total length (n,) [m], and the outermost edges low and high (n,) [m].
-
-    The edges of a set without contact are NaN.
-    """
-
-    length: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-
-
-def find_intervals(x, active, edges: ContactEdges) -> ContactIntervals:
+def find_intervals(x, active, edges: ContactEdges) -> np.ndarray:
     """Find the intervals in contact of n sets, of which an end of the interface that is in contact is an end.
 
     An interval of a node or two may be shorter than the offsets of its edges; its length is 0 then.
@@ -302,7 +207,7 @@ def find_intervals(x, active, edges: ContactEdges) -> ContactIntervals:
     Parameters
     ----------
     x : (m,) ndarray
-        Positions [m].
+        Positions [m]; only the first and the last one count.
     active : (n, m) bool ndarray
         Contact sets; only the first and the last node count.
     edges : ContactEdges
@@ -310,7 +215,8 @@ def find_intervals(x, active, edges: ContactEdges) -> ContactIntervals:
 
     Returns
     -------
-    ContactIntervals
+    (n, k, 2) ndarray
+        Begin and end [m] of each interval by increasing x; NaN beyond the last interval of a set.
     """
     marks = np.column_stack(
         [
@@ -320,40 +226,13 @@ def find_intervals(x, active, edges: ContactEdges) -> ContactIntervals:
         ]
     )
     # The positions of a set move to the front, so that each pair of them is an interval
-    order = np.argsort(np.isnan(marks), axis=1, kind="stable")
-    marks = np.take_along_axis(marks, order, axis=1)[:, : marks.shape[1] // 2 * 2]
+    is_beyond = np.isnan(marks)
+    n_marks = int((~is_beyond).sum(axis=1).max(initial=0))
+    order = np.argsort(is_beyond, axis=1, kind="stable")[:, :n_marks]
+    marks = np.take_along_axis(marks, order, axis=1)
     pairs = np.clip(marks.reshape(len(marks), -1, 2), x[0], x[-1])
     middle = pairs.mean(axis=2)
-    low = np.minimum(pairs[..., 0], middle)
-    high = np.maximum(pairs[..., 1], middle)
-    return ContactIntervals(
-        length=np.nansum(high - low, axis=1),
-        low=np.fmin.reduce(low, axis=1, initial=np.nan),
-        high=np.fmax.reduce(high, axis=1, initial=np.nan),
-    )
-
-
-def contact_intervals(x, force, edges: list[ContactEdge]) -> np.ndarray:
-    """Return the intervals in contact (k, 2) [m] in ascending order of x.
-
-    An interval of a node or two may be shorter than the offsets of its edges; its length is 0 then.
-
-    Parameters
-    ----------
-    x, force : (m,) ndarray
-        Positions [m] and forces [N]. Only the first and the last count: an end of the interface that carries load is an
-        end of an interval.
-    edges : list of ContactEdge
-        Edges of the set by increasing x.
-    """
-    positions = [edge.position for edge in edges]
-    if force[0] > 0:
-        positions = [x[0], *positions]
-    if force[-1] > 0:
-        positions = [*positions, x[-1]]
-    pairs = np.clip(np.array(positions, float).reshape(-1, 2), x[0], x[-1])
-    middle = pairs.mean(axis=1)
-    return np.stack([np.minimum(pairs[:, 0], middle), np.maximum(pairs[:, 1], middle)], axis=1)
+    return np.stack([np.minimum(pairs[..., 0], middle), np.maximum(pairs[..., 1], middle)], axis=-1)
 
 
 def parabola_change(edge_shift: float, gain: float, loss: float) -> float:

@@ -7,7 +7,7 @@ cells.
 import numpy as np
 
 from .cells import CellCompliance
-from .edges import ContactEdge, parabola_change, place_edges
+from .edges import ContactEdges, EdgeCells, find_edges, parabola_change
 from .press_cells import solve_on_set
 
 # Offset of a contact edge (see `edges.compute_edge_offset`) relative to the cell length, measured to 0.001
@@ -18,7 +18,7 @@ CELL_EDGE_OFFSET_FRACTION = 0.189
 MAX_REFERENCE_CELLS = 64
 
 
-def find_row_edges(compliance: CellCompliance, pressure, gap, pressure_rate) -> list[ContactEdge]:
+def find_row_edges(compliance: CellCompliance, pressure, gap, pressure_rate) -> ContactEdges:
     """Find the contact edges on a row of cells.
 
     Parameters
@@ -32,23 +32,18 @@ def find_row_edges(compliance: CellCompliance, pressure, gap, pressure_rate) -> 
 
     Returns
     -------
-    list of ContactEdge
-        By increasing x.
+    ContactEdges
+        Edges of the only contact set.
     """
-    gap_rate = 1 - compliance.product(pressure_rate[None])[0]
-    return place_edges(
-        compliance.x,
-        pressure,
-        gap,
-        pressure_rate,
-        gap_rate,
-        lambda node, inner, outer, fraction: CELL_EDGE_OFFSET_FRACTION * outer,
-    )
+    active = pressure > 0
+    gap_rate = compliance.product(pressure_rate[None])[0] - 1
+    unknown = np.where(active, pressure, gap)[None]
+    rate = np.where(active, pressure_rate, gap_rate)[None]
+    cells = EdgeCells(offset=CELL_EDGE_OFFSET_FRACTION)
+    return find_edges(compliance.x, active[None], unknown, rate, cells)
 
 
-def compute_row_stiffness(
-    compliance: CellCompliance, active, motion, edges: list[ContactEdge]
-) -> float:
+def compute_row_stiffness(compliance: CellCompliance, active, motion, edges: ContactEdges) -> float:
     """Compute the stiffness of a contact whose edges may lie between the cells of a row.
 
     Each edge adds the change along the parabola through the set with one cell less and one more (`contact.edges`). The
@@ -63,7 +58,7 @@ def compute_row_stiffness(
         Contact set.
     motion : (n,) ndarray
         Displacement of the cells per unit: 1 for a translation, x for a rotation.
-    edges : list of ContactEdge
+    edges : ContactEdges
         Edges of the set.
 
     Returns
@@ -73,23 +68,26 @@ def compute_row_stiffness(
     """
     traction = _solve(compliance, active, motion)
     stiffness = float(traction @ motion)
-    if edges and active.sum() >= 3:
+    (node,) = edges.node
+    (side,) = edges.side
+    if node.size and active.sum() >= 3:
         # Compliance of the cell beyond the edge of the longest contact, and stiffness of the last cell before it, while
         # the other cells in contact are held (Schur complements)
         mismatch = motion - compliance.product(traction[None])[0]
-        longest_edge = max(edges, key=lambda edge: _count_contact_cells(active, edge))
+        lengths = [_count_contact_cells(active, *end) for end in zip(node, side)]
+        longest = int(np.argmax(lengths))
         indices = np.arange(motion.size)
-        outside = longest_edge.node + longest_edge.side
-        inner_unit = (indices == longest_edge.node).astype(float)
-        inner_stiffness = _solve(compliance, active, inner_unit)[longest_edge.node]
+        inside = node[longest]
+        outside = inside + side[longest]
+        inner_unit = (indices == inside).astype(float)
+        inner_stiffness = _solve(compliance, active, inner_unit)[inside]
         column = compliance.product((indices == outside).astype(float)[None])[0]
         held = _solve(compliance, active, column)
         outer_compliance = column[outside] - float(held @ column)
 
-        for edge in edges:
-            gain = mismatch[edge.node + edge.side] ** 2 / outer_compliance
-            loss = traction[edge.node] ** 2 / inner_stiffness
-            stiffness += parabola_change(edge.fraction - 0.5, gain, loss)
+        gain = mismatch[node + side] ** 2 / outer_compliance
+        loss = traction[node] ** 2 / inner_stiffness
+        stiffness += float(parabola_change(edges.fraction[0] - 0.5, gain, loss).sum())
     return stiffness * compliance.cell_area
 
 
@@ -98,14 +96,14 @@ def _solve(compliance: CellCompliance, active, motion) -> np.ndarray:
     return solve_on_set(compliance, active[None], motion)[0]
 
 
-def _count_contact_cells(active: np.ndarray, edge: ContactEdge) -> int:
-    """Count the cells of the contact interval that ends at a given edge.
+def _count_contact_cells(active: np.ndarray, node: int, side: int) -> int:
+    """Count the cells of the contact interval that ends beyond a node, towards a side of 1 or -1.
 
     `active` (n,) is True at cells in contact. At most `MAX_REFERENCE_CELLS` are counted.
     """
-    if edge.side > 0:
-        first = max(edge.node - MAX_REFERENCE_CELLS + 1, 0)
-        cells = active[first : edge.node + 1][::-1]
+    if side > 0:
+        first = max(node - MAX_REFERENCE_CELLS + 1, 0)
+        cells = active[first : node + 1][::-1]
     else:
-        cells = active[edge.node : edge.node + MAX_REFERENCE_CELLS]
+        cells = active[node : node + MAX_REFERENCE_CELLS]
     return int(np.argmin(np.append(cells, False)))

@@ -183,7 +183,7 @@ def _find_contact(result: Result) -> JsonObject:
     if patch.points is not None:
         intervals = patch.points.intervals
     else:
-        intervals = values.contact_intervals(patch, values.contact_ends(patch))
+        intervals = values.find_contact_intervals(patch)
     ends = {"from": patch.x[0], "to": patch.x[-1]}
     return ends | {"stretches": intervals.tolist()}
 

@@ -50,10 +50,7 @@ PUBLIC = {
     "patch.mesh_levels": ("solve_with_coarser",),
     "probe": ("run_probe",),
     "patch.result": ("make_piece_meshes_of_run",),
-    "patch.values": (
-        "contact_ends",
-        "contact_intervals",
-    ),
+    "patch.values": ("find_contact_intervals",),
     "pieces": (
         "PieceFields",
         "Pieces",

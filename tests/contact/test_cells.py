@@ -104,7 +104,7 @@ def press_row(row, gap, load: float):
     unit = np.ones(gap.size)
     rate = solve_on_set(row, active[None])[0]
     edges = find_row_edges(row, pressure, pressed.gap[0], rate)
-    return [edge.position for edge in edges], compute_row_stiffness(row, active, unit, edges)
+    return edges.position[0], compute_row_stiffness(row, active, unit, edges)
 
 
 def test_exact_row_edges_agree_with_refined_row(n_cells: int = 721):

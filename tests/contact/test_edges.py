@@ -49,11 +49,13 @@ def test_exact_wedge_on_springs_edge_and_stiffness(load):
     force = state.sigma_n * weight
     cells = edges.EdgeCells(layer_fraction=np.ones(x.size))
     solution, ends = find_edges(pieces, force, state.gap, cells)
-    (end,) = ends.list_edges(0)
     expected = state.approach / angle
-    assert end.side == 1 and end.position == pytest.approx(expected, abs=1e-12)
-    assert edges.contact_intervals(x, force, [end])[0] == pytest.approx([x[0], expected], abs=1e-12)
-    change = edges.parabola_change(end.fraction - 0.5, solution.gain[0, 0], solution.loss[0, 0])
+    assert ends.side.tolist() == [[1]]
+    assert ends.position[0, 0] == pytest.approx(expected, abs=1e-12)
+    interval = edges.find_intervals(x, force[None] > 0, ends)[0, 0]
+    assert interval == pytest.approx([x[0], expected], abs=1e-12)
+    shift = ends.fraction[0, 0] - 0.5
+    change = edges.parabola_change(shift, solution.gain[0, 0], solution.loss[0, 0])
     stiffness = solution.force[0].sum() + change
     assert stiffness == pytest.approx(k * WIDTH * (expected - x[0]), rel=1e-9)
 
@@ -80,7 +82,7 @@ def find_hertz_edges(hertz_block, load: float) -> tuple:
     weight = pieces.interface.weight
     state = press(pieces, x**2 / (2 * 57.7e-3), load)
     force = state.sigma_n * weight
-    return force, find_edges(pieces, force, state.gap, edges.EdgeCells(row_height))[1].list_edges(0)
+    return force, find_edges(pieces, force, state.gap, edges.EdgeCells(row_height))[1]
 
 
 def test_always_hertz_edges_are_accurate_to_fraction_of_element(hertz_block):
@@ -92,12 +94,11 @@ def test_always_hertz_edges_are_accurate_to_fraction_of_element(hertz_block):
     young, nu = TITANIUM
     modulus = young / (1 - nu**2) / 2
     for load in np.linspace(80.0, 150.0, 14):
-        force, edge_list = find_hertz_edges(hertz_block, load)
+        force, ends = find_hertz_edges(hertz_block, load)
         half_width = hertz_half_width(load / WIDTH, 57.7e-3, modulus)
-        computed_half_width = (
-            np.diff(edges.contact_intervals(hertz_block[0].interface.x, force, edge_list)).sum() / 2
-        )
-        assert [end.side for end in edge_list] == [-1, 1]
+        intervals = edges.find_intervals(hertz_block[0].interface.x, force[None] > 0, ends)
+        computed_half_width = np.diff(intervals).sum() / 2
+        assert ends.side[0].tolist() == [-1, 1]
         assert computed_half_width == pytest.approx(
             half_width, abs=0.05 * HALF_WIDTH / 10 + 2e-3 * half_width
         )

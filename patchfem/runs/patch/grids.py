@@ -23,7 +23,7 @@ from ...model.pieces import extend_grid, find_rounded_edges
 from . import slip_zones, store
 from .condensed import CondensedPair, condense
 from .press import Patch, PressedCases, solve_patch_contact
-from .values import contact_ends, find_contact_edges
+from .values import find_contact_edges
 
 # Number of equal columns of the grid on which the search for the contact starts.
 N_SEARCH_COLUMNS = 96
@@ -250,7 +250,7 @@ def _find_patch_extent(patch: Patch) -> ContactExtent:
     extent = find_contact_extent(patch.pressed, 0)
     if slip is None or not np.isfinite(extent.cell):
         return extent
-    return replace(extent, slip_zones=slip_zones.find_slip_zones(patch, slip, contact_ends(patch)))
+    return replace(extent, slip_zones=slip_zones.find_slip_zones(patch, slip))
 
 
 def make_load_variants(patch_model) -> list[PatchModel]:
@@ -457,9 +457,10 @@ def find_contact_extent(pressed: PressedCases, case: int) -> ContactExtent:
     edge_positions = (x[edge_cells] + x[edge_cells + 1]) / 2
     cells = np.diff(x)[edge_cells]
     if pressed.active[case].any():
-        edges = find_contact_edges(pressed).list_edges(case)
-        if len(edges) == edge_cells.size:
-            edge_positions = np.array([end.position for end in edges])
+        edges = find_contact_edges(pressed)
+        exists = edges.exists[case]
+        if exists.sum() == edge_cells.size:
+            edge_positions = edges.position[case, exists]
 
     corners = tuple(float(x[at]) for at in (0, -1) if is_loaded[at])
     low = edge_positions[0] if loaded_nodes[0] else x[0]

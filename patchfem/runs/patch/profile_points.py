@@ -11,7 +11,7 @@ import numpy as np
 
 from ...contact import row_edges
 from ...contact.cells import make_block
-from ...contact.edges import contact_intervals
+from ...contact.edges import find_intervals
 from ...contact.press_cells import FaceLoading, press_cells, solve_on_set
 from ...core import NotConverged
 from ...elasticity.lapack import use_one_blas_thread
@@ -230,7 +230,7 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     pressure_rate = solve_on_set(normal, active[None], unit)[0]
     contact_edges = row_edges.find_row_edges(normal, pressure, opening, pressure_rate)
     # A loaded point at an end of the interface is in contact as far as this end.
-    intervals = contact_intervals(half_points[[0, -1]], pressure[[0, -1]], contact_edges)
+    intervals = find_intervals(half_points[[0, -1]], active[None, [0, -1]], contact_edges)[0]
     are_alike = pieces.are_alike
     compute_stiffness = row_edges.compute_row_stiffness
     edge_values = EdgeValues(
@@ -255,8 +255,8 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     resolution = Resolution(
         length=length,
         n_nodes=int(active.sum()),
-        longest_cell=cell * bool(contact_edges),
-        edge_cells=cell * len(contact_edges),
+        longest_cell=cell * bool(contact_edges.node.size),
+        edge_cells=cell * contact_edges.node.size,
         edge_offset=MIN_CONTACT_EDGE_ERROR_IN_CELLS,
         can_rotate=patch_model.loading.moment is not None,
         closing=float(np.ptp(gap) + np.abs(normal.product(pressed.pressure)).max()),

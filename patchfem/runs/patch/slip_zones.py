@@ -5,13 +5,13 @@ In: a solved patch and the `PrescribedSlip`. Out: zones along the interface.
 
 import numpy as np
 
-from ...contact.edges import ContactEdge
 from .jenkins_elements import elements
+from .values import find_contact_edges
 
 Zone = tuple[float, float]  # start and end [m]
 
 
-def find_slip_zones(patch, slip, ends: list[ContactEdge]) -> tuple[Zone, ...]:
+def find_slip_zones(patch, slip) -> tuple[Zone, ...]:
     """Return the zones (start, end) [m] that slip at a given displacement amplitude.
 
     The yield displacement is interpolated linearly between nodes. At a contact edge between two
@@ -23,14 +23,14 @@ def find_slip_zones(patch, slip, ends: list[ContactEdge]) -> tuple[Zone, ...]:
         Solved patch.
     slip : PrescribedSlip
         Prescribed displacement.
-    ends : list of contact.edges.ContactEdge
-        Contact edges inside the interface.
     """
     if not patch.active.any():
         return ()
 
     jenkins_set = elements(patch, slip.static, slip.bond_length)
-    edge_by_node = {(end.node, end.side): end.position for end in ends}
+    edges = find_contact_edges(patch.pressed)
+    positions_by_node = zip(edges.node[0].tolist(), edges.side[0].tolist(), edges.position[0])
+    edge_by_node = {(node, side): position for node, side, position in positions_by_node}
     breaks = 1 + np.flatnonzero(np.diff(jenkins_set.points) > 1)
     intervals = np.split(jenkins_set.points, breaks), np.split(jenkins_set.point_yields, breaks)
     out = []

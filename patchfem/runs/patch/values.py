@@ -210,11 +210,14 @@ def _compute_edge_values(pressed: PressedCases) -> EdgeValues:
     All depend on where the contact ends between two nodes, which the nodal pressures show.
     """
     contact_edges = find_contact_edges(pressed)
-    intervals = edges.find_intervals(pressed.x, pressed.active, contact_edges)
+    low, high = np.moveaxis(edges.find_intervals(pressed.x, pressed.active, contact_edges), -1, 0)
+    width = np.fmax.reduce(high, axis=1, initial=np.nan) - np.fmin.reduce(
+        low, axis=1, initial=np.nan
+    )
     normal, rotational, tangential = _compute_stiffnesses(pressed, contact_edges)
     return EdgeValues(
-        length=intervals.length,
-        width=np.nan_to_num(intervals.high - intervals.low),
+        length=np.nansum(high - low, axis=1),
+        width=np.nan_to_num(width),
         normal=normal,
         tangential=tangential,
         rotational=rotational,
@@ -239,7 +242,7 @@ def find_contact_edges(pressed: PressedCases) -> edges.ContactEdges:
         layer = level.linear_layer
         cells = edges.EdgeCells(
             level.pair.row,
-            level.pair.is_quadratic,
+            edges.QUADRATIC_EDGE_OFFSET_FRACTION if level.pair.is_quadratic else None,
             None if layer is None else layer / np.diag(table.compliance),
         )
         unknown = np.where(active, pressed.force, pressed.gap)
@@ -302,19 +305,10 @@ def _compute_stiffnesses(pressed: PressedCases, contact_edges: edges.ContactEdge
     return work + edges.parabola_change(shift, *changes).sum(axis=-1)
 
 
-def contact_intervals(patch: Patch, ends: list[edges.ContactEdge]) -> np.ndarray:
-    """Return the contact intervals (k, 2) [m] of a patch in the order of increasing x.
-
-    `ends` are the contact edges from `contact_ends`.
-    """
-    return edges.contact_intervals(patch.x, patch.active, ends)
-
-
-def contact_ends(patch: Patch) -> list[edges.ContactEdge]:
-    """Return the contact edges between nodes as a list of `ContactEdge`."""
-    if not patch.active.any():
-        return []
-    return find_contact_edges(patch.pressed).list_edges(0)
+def find_contact_intervals(patch: Patch) -> np.ndarray:
+    """Return the contact intervals (k, 2) [m] of a patch in the order of increasing x."""
+    pressed = patch.pressed
+    return edges.find_intervals(pressed.x, pressed.active, find_contact_edges(pressed))[0]
 
 
 def unresolved_edge_rounding_pressure(pressed: PressedCases) -> np.ndarray:
