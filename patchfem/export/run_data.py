@@ -395,7 +395,7 @@ def _spread_over_face(data: Variables, patch) -> Variables:
             values = variable.values.reshape(*variable.values.shape[:-1], *patch.shape)
             variable = replace(variable, dims=(*variable.dims[:-1], "y", "x"), values=values)
         spread[name] = variable
-    normal = patch.cells.normal
+    normal = patch.pieces.normal
     x_text = "position of the middle of the cells along the sliding direction"
     y_text = "position of the middle of the cells across the sliding direction"
     return (
