@@ -374,7 +374,7 @@ def _collect_patch(result: Result) -> Variables:
 
 def _collect_reversal(result: Result) -> Variables:
     """Return the state of the cells of a face at the last reversal and their slip per cycle; {} without partial slip."""
-    reversal = area_motion.find_face_reversal(result)
+    reversal = area_motion.find_face_reversal(result, result.patch)
     if reversal is None:
         return {}
     text = "contact status at the last reversal of the slide"

@@ -13,12 +13,12 @@ import numpy as np
 
 from ...contact.cells import CellCompliance, make_block
 from ...contact.press_cells import FaceLoading, compute_set_stiffness, press_cells
-from ...convergence import convergence_error
 from ...core import Compliance, ContactState, Interface, Outcome, frozen_array
 from ...elasticity.sides import BlockShape
 from ...model.face import compute_face_gap
 from ...model.patch import PatchModel
 from ...model.pieces import make_layer_stacks
+from ...response.coarser import face_errors
 from ..results.patch_rows import CELLS_SOURCE, Values, make_measure
 from . import store
 from .measures import (
@@ -28,7 +28,7 @@ from .measures import (
     max_mesh_error_ratio,
 )
 from .press import Patch
-from .values import EdgeValues, assemble_static_values
+from .values import AcrossValues, EdgeValues, assemble_static_values
 
 FIRST_CELLS = 64  # cells along the longer side of the coarsest grid
 MIN_CELLS_ACROSS = (
@@ -37,12 +37,12 @@ MIN_CELLS_ACROSS = (
 MIN_GRIDS = 3  # grids after which the order of convergence shows
 SIDE_LEVEL = 1  # level of the bricks of the free sides of the finest grid
 COARSE_SIDE_LEVEL = 0  # level of the bricks of the free sides of coarser grids
-# Order of convergence of a face: an edge of contact follows the sides of cells, so that its position has an error of a part
-# of a cell that varies irregularly from grid to grid. A higher order shows by chance.
-FACE_ORDER = 1.0
 # A boundary of cells counts this part of each of its sides too much (Yastrebov, Anciaux and Molinari, Tribology Letters
 # 65, 2017).
 BOUNDARY_SIDE_FRACTION = (np.pi - 1 + np.log(2)) / 24
+# Error of the number of cells in contact over the root of the number of sides at its boundary: two standard deviations of the
+# sum of as many errors that are even between -.5 and .5
+CELL_COUNT_ERROR = 0.5
 # Smallest error that is stated, relative to a value and to the larger terms whose difference it is; the contact is solved to
 # 1e-8 of the displacement
 MIN_RELATIVE_ERROR = 1e-7
@@ -222,8 +222,8 @@ def compute_face_values(patch: AreaPatch) -> Values:
     state = patch.pressure
     active = pressure > 0
     area = pieces.length * pieces.width * pieces.pairs
-    n_sides = sum(np.count_nonzero(np.diff(active, axis=axis)) for axis in (0, 1))
-    fraction = (active.sum() - BOUNDARY_SIDE_FRACTION * n_sides) / active.size
+    n_cells = active.sum() - BOUNDARY_SIDE_FRACTION * count_boundary_sides(active)
+    fraction = n_cells / active.size
 
     def compute_stiffness(cells, motion=1.0) -> float:
         """Return the stiffness of the set in contact against a motion of its cells."""
@@ -238,22 +238,22 @@ def compute_face_values(patch: AreaPatch) -> Values:
         tangential=compute_stiffness(patch.pieces.tangential),
         rotational=compute_stiffness(normal, normal.x),
     )
-    values = assemble_static_values(
-        pieces.length, area, state, estimate_peak(pressure), edge_values
-    )
-
     # What only a face has
-    roll_moment = patch.normal_stress * patch.pieces.interface.weight @ patch.y
-    values |= {
-        "contact_area": fraction * area,
-        "pressure_centre_y": roll_moment / state.load if state.load > 0 else 0.0,
-        "roll": patch.model.gap.roll + patch.pressed.tilt_y,
-        "roll_moment": roll_moment,
-        "roll_stiffness": compute_stiffness(normal, normal.y[:, None]),
-    }
-    if patch.model.area.hardness is not None:
-        values["yielded_fraction"] = (pressure >= patch.model.area.hardness).mean()
+    hardness = patch.model.area.hardness
+    across = AcrossValues(
+        roll=patch.model.gap.roll + patch.pressed.tilt_y,
+        moment=patch.normal_stress * patch.pieces.interface.weight @ patch.y,
+        stiffness=compute_stiffness(normal, normal.y[:, None]),
+        yielded_fraction=None if hardness is None else (pressure >= hardness).mean(),
+    )
+    peak = estimate_peak(pressure)
+    values = assemble_static_values(pieces.length, area, state, peak, edge_values, across)
     return {name: float(value) for name, value in values.items()}
+
+
+def count_boundary_sides(active: np.ndarray) -> int:
+    """Return the number of sides between cells in contact, `active` (ny, nx), and others."""
+    return sum(np.count_nonzero(np.diff(active, axis=axis)) for axis in (0, 1))
 
 
 def estimate_peak(pressure: np.ndarray) -> float:
@@ -284,7 +284,7 @@ def with_face_measures(
 ) -> "tuple[AreaPatch | None, ...]":
     """Return a face on successive grids, of which the finest one has its static measures with their errors.
 
-    The errors follow from the changes over the grids, whose order is `FACE_ORDER`. Without a second grid they are None.
+    The errors follow from the changes over the grids (`face_errors`). Without a second grid they are None.
 
     Parameters
     ----------
@@ -302,15 +302,19 @@ def with_face_measures(
     pieces = patch.model.pieces
     series = [compute_face_values(one) for one in patches if one is not None]
     values = series[0]
+    errors = face_errors(*series) if len(series) > 1 else {}
     larger_terms = list_larger_terms(values, pieces.length / 2, pieces.width / 2)
+    active = patch.pressed.pressure > 0
+    count_error = CELL_COUNT_ERROR * np.sqrt(count_boundary_sides(active)) / active.size
+    area = values["contact_area"] / (values["contact_fraction"] or 1.0)
+    min_errors = {"contact_fraction": count_error, "contact_area": count_error * area}
     measures = {}
     for name, value in values.items():
-        error = None
         larger_term = larger_terms.get(name, 0.0)
-        if len(series) > 1:
-            changes = -np.diff([row[name] for row in series])
-            error = convergence_error(*changes, max_order=FACE_ORDER)
+        error = errors.get(name)
+        if errors:
             error = max(error, MIN_RELATIVE_ERROR * max(abs(value), larger_term))
+            error = max(error, min_errors.get(name, 0.0))
         measure = make_measure(name, value, error, CELLS_SOURCE)
         measures[name] = replace(measure, floor=max(measure.floor, tolerance * larger_term))
 

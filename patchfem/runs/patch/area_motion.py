@@ -3,13 +3,14 @@
 In: a `Result` of a bench or a rig with [contact.area]. Out: a `ReversalState`, and the measure stick_area_fraction.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ...convergence import convergence_error
 from ...effects import law_has_trait
 from ...friction.record import make_law
+from ...response.coarser import face_errors
 from ...slip import first_loading
 from ..results.patch_rows import CELLS_SOURCE, make_measure
 from . import jenkins_elements, store
@@ -19,9 +20,7 @@ from .area import AreaPatch
 MAX_STUCK_SLIP_FRACTION = 1e-2
 
 
-def find_face_reversal(
-    result, patch: AreaPatch | None = None
-) -> "first_loading.ReversalState | None":
+def find_face_reversal(result, patch: AreaPatch) -> "first_loading.ReversalState | None":
     """Find the state of a face at the last reversal of the slide.
 
     Laws of parallel elements follow Masing's rule from the first loading. Under laws with bonds, a cell sticks that hardly
@@ -31,8 +30,8 @@ def find_face_reversal(
     ----------
     result : Result
         Run with [contact.area].
-    patch : AreaPatch, optional
-        Face on another grid; by default that of the result.
+    patch : AreaPatch
+        Face of the result, or the face on another grid.
 
     Returns
     -------
@@ -40,7 +39,6 @@ def find_face_reversal(
         None without a cycle, without contact, or if the face slips as a whole.
     """
     model = result.plan.model
-    patch = patch or result.patch
     window = result.window
     if window is None or not model.partial_slip or not patch.pressure.load > 0:
         return None
@@ -77,26 +75,24 @@ def _find_in_frames(result) -> "first_loading.ReversalState | None":
     return first_loading.ReversalState(status.astype(np.int8), path)
 
 
-def add_reversal_measure(result, coarse: AreaPatch | None):
+def add_reversal_measure(result, coarse: Sequence[AreaPatch | None]):
     """Return the result of a run with [contact.area] with the measure stick_area_fraction, if a part of the face slips.
 
     Parameters
     ----------
     result : Result
         Run of a bench or a rig.
-    coarse : AreaPatch or None
-        Face on the next coarser grid, whose change is the error.
+    coarse : sequence of AreaPatch or None
+        Face on the coarser grids, whose changes give the error.
     """
-    reversal = find_face_reversal(result)
-    if reversal is None:
-        return result
-    error = None
-    other = None if coarse is None else find_face_reversal(result, coarse)
-    if other is not None:
-        error = float(convergence_error(reversal.stick_fraction - other.stick_fraction))
     name = "stick_area_fraction"
-    measure = make_measure(name, reversal.stick_fraction, error, CELLS_SOURCE)
-    if error is None:
+    states = [find_face_reversal(result, patch) for patch in (result.patch, *coarse) if patch]
+    known = [{name: state.stick_fraction} for state in states if state is not None]
+    if states[0] is None:
+        return result
+    errors = face_errors(*known) if len(known) > 1 else {}
+    measure = make_measure(name, known[0][name], errors.get(name), CELLS_SOURCE)
+    if not errors:
         measure = replace(
             measure, reason="error unknown: the state is that of the frames of a cycle"
         )
