@@ -5,7 +5,7 @@ transforms; S is the smooth change by the free sides (`elasticity.sides`). Array
 columns along x. A profile that does not vary across the width is a single row, ny = 1.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -47,12 +47,16 @@ class CellCompliance:
     - length, width: Lengths of the face along x and y [m].
     - waves (ny, nx): Compliance [m/Pa] for a traction cos(j pi x/length) cos(i pi y/width).
     - sides: Change by free sides; None between guides.
+    - local: Compliance [m/Pa] in series with each cell, (ny, nx) or a number, such as that of bonds.
+    - pairs: Number of equal faces that share the forces.
     """
 
     length: float
     width: float
     waves: np.ndarray
     sides: SideCompliance | None = None
+    local: np.ndarray | float = 0.0
+    pairs: int = 1
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -61,8 +65,8 @@ class CellCompliance:
 
     @property
     def cell_area(self) -> float:
-        """Area of a cell [m2]."""
-        return self.length * self.width / self.waves.size
+        """Area of a cell [m2], summed over the pairs."""
+        return self.length * self.width * self.pairs / self.waves.size
 
     @cached_property
     def x(self) -> np.ndarray:
@@ -74,26 +78,59 @@ class CellCompliance:
         """Centres (ny,) [m] of the rows; 0 in the middle of the face."""
         return _find_centres(self.width, self.shape[0])
 
+    @property
+    def is_rigid(self) -> bool:
+        """Whether no cell moves relative to another."""
+        return not self.waves.ravel()[1:].any() and not np.any(self.local)
+
     @cached_property
     def self_compliance(self) -> float:
         """Mean displacement of a cell per traction on it alone [m/Pa], without the free sides."""
-        return float(self.waves.mean())
+        return float(self.waves.mean() + np.mean(self.local))
 
     @cached_property
     def _stiffness(self) -> np.ndarray:
-        """Traction per displacement (ny, nx) [Pa/m] of each wave."""
-        return 1 / self.waves
+        """Traction per displacement (ny, nx) [Pa/m] of each wave, with the mean local compliance; 0 for rigid waves."""
+        compliance = self.waves + np.mean(self.local)
+        return np.divide(1, compliance, out=np.zeros(self.shape), where=compliance > 0)
 
     def product(self, traction: np.ndarray) -> np.ndarray:
         """Return the displacement (ny, nx) [m] of the cells under a traction (ny, nx) [Pa]."""
-        displacement = _multiply_waves(self.waves, traction)
+        displacement = _multiply_waves(self.waves, traction) + self.local * traction
         if self.sides is not None:
-            displacement += self.sides.product(traction, self.cell_area)
+            displacement += self.sides.product(traction, self.cell_area / self.pairs)
         return displacement
 
     def precondition(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the traction (ny, nx) [Pa] that displaces all cells of a guided block by (ny, nx) [m]."""
+        """Return about the traction (ny, nx) [Pa] that displaces all cells of a guided block by (ny, nx) [m]."""
         return _multiply_waves(self._stiffness, displacement)
+
+    def __matmul__(self, force: np.ndarray) -> np.ndarray:
+        """Return the displacement (m,) [m] under forces (m,) [N] on the m = ny nx cells, as a matrix does."""
+        return self.product(np.reshape(force / self.cell_area, self.shape)).ravel()
+
+    def diagonal(self) -> np.ndarray:
+        """Return the displacement (m,) [m/N] of each cell under a force on it alone, without the free sides."""
+        own = self.waves.mean() + np.broadcast_to(self.local, self.shape)
+        return own.ravel() / self.cell_area
+
+    def soften(self, local: np.ndarray | float) -> "CellCompliance":
+        """Return the cells with a further local compliance [m/Pa] in series, (ny, nx) or a number."""
+        return replace(self, local=self.local + local)
+
+    def add_spring(self, compliance: float) -> "CellCompliance":
+        """Return the cells in series with a spring [m/N] that carries the force on all of them.
+
+        The spring moves all cells by its compliance times the sum of the forces, as the wave that does not vary.
+        """
+        waves = self.waves.copy()
+        waves[0, 0] += compliance * self.cell_area * waves.size
+        return replace(self, waves=waves)
+
+    def scale(self, factor: float) -> "CellCompliance":
+        """Return the compliance times a factor."""
+        sides = self.sides and self.sides._replace(change=factor * self.sides.change)
+        return replace(self, waves=factor * self.waves, sides=sides, local=factor * self.local)
 
 
 def _find_centres(length: float, count: int) -> np.ndarray:
@@ -110,10 +147,11 @@ def _multiply_waves(factors: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 class BlockCompliance(NamedTuple):
-    """Compliance of the cells of two pressed blocks.
+    """Compliance of two pressed blocks at the cells of their face.
 
-    - normal: Under normal tractions.
-    - shear: Under shear tractions along x, without their coupling to normal displacements; exact for equal pieces.
+    - normal: Displacement towards each other under normal tractions.
+    - shear: Displacement along x under shear tractions along x, without their coupling to normal displacements, which is 0
+      for equal blocks.
     """
 
     normal: CellCompliance
@@ -159,12 +197,13 @@ def make_block(
         shear += multiplicity * waves.across
         shear += multiplicity * along_fraction * (waves.along - waves.across)
 
-    normal_sides = shear_sides = None
+    changes = (None, None)
     if side_level is not None:
-        normal_sides, shear_sides = _place_sides(shape, multiplicities, cells, side_level)
+        changes = _place_sides(shape, multiplicities, cells, side_level)
+    sizes = (shape.length, shape.width)
     return BlockCompliance(
-        CellCompliance(shape.length, shape.width, normal, normal_sides),
-        CellCompliance(shape.length, shape.width, shear, shear_sides),
+        CellCompliance(*sizes, normal, changes[0], pairs=shape.pairs),
+        CellCompliance(*sizes, shear, changes[1], pairs=shape.pairs),
     )
 
 

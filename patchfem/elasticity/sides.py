@@ -79,11 +79,13 @@ class BlockShape(NamedTuple):
     - length, width: Lengths of the face along x and y [m].
     - free_sides: "xy" for four free sides; "x" for free sides at both ends of x, guides along y and loads that do not vary
       along y (a plane problem).
+    - pairs: Number of equal pairs of blocks that share the forces.
     """
 
     length: float
     width: float
     free_sides: str = "xy"
+    pairs: int = 1
 
 
 class Axis(NamedTuple):

@@ -374,7 +374,7 @@ def _collect_patch(result: Result) -> Variables:
 
 def _collect_reversal(result: Result) -> Variables:
     """Return the state of the cells of a face at the last reversal and their slip per cycle; {} without partial slip."""
-    reversal = area_motion.find_face_reversal(result)
+    reversal = area_motion.find_face_reversal(result, result.patch)
     if reversal is None:
         return {}
     text = "contact status at the last reversal of the slide"
@@ -395,7 +395,7 @@ def _spread_over_face(data: Variables, patch) -> Variables:
             values = variable.values.reshape(*variable.values.shape[:-1], *patch.shape)
             variable = replace(variable, dims=(*variable.dims[:-1], "y", "x"), values=values)
         spread[name] = variable
-    normal = patch.cells.normal
+    normal = patch.pieces.normal
     x_text = "position of the middle of the cells along the sliding direction"
     y_text = "position of the middle of the cells across the sliding direction"
     return (

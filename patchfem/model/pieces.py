@@ -45,13 +45,11 @@ def make_layer_stacks(
     patch: PatchModel,
 ) -> "tuple[elasticity.sides.LayerStack, elasticity.sides.LayerStack]":
     """Return the layers of the upper and of the lower piece of a patch, from the face to the far face."""
-    upper, lower = (
-        elasticity.sides.make_stack(
-            piece.height, piece.thickness, make_elastic_layers(patch, piece)
-        )
-        for piece in (patch.pieces.upper, patch.pieces.lower)
-    )
-    return upper, lower
+    stacks = []
+    for piece in (patch.pieces.upper, patch.pieces.lower):
+        layers = make_elastic_layers(patch, piece)
+        stacks.append(elasticity.sides.make_stack(piece.height, piece.thickness, layers))
+    return tuple(stacks)
 
 
 def _make_flat_grid(patch: PatchModel, piece: PatchPiece):

@@ -58,6 +58,7 @@ def convergence_errors(
     *values: Values,
     ratio: float = 2.0,
     order: float = MIN_CONVERGENCE_ORDER,
+    max_order: float = MAX_CONVERGENCE_ORDER,
     steps: int | None = None,
 ) -> Values:
     """Estimate the error of each measure from two or more successive runs (`convergence_error`).
@@ -66,8 +67,9 @@ def convergence_errors(
     ----------
     *values : dict
         Measures by name of the runs, from fine to coarse; floats or arrays (n,) of many runs.
-    ratio, order : float
-        Ratio of the step or cell sizes of successive runs, and order of convergence.
+    ratio, order, max_order : float
+        Ratio of the step or cell sizes of successive runs, order of convergence that is assumed, and the highest one that
+        the changes can show.
     steps : int, optional
         Steps per cycle of the finest run, if the others have fewer steps. The error of a measure that
         is resolved only to a sample is then increased by this resolution.
@@ -81,7 +83,7 @@ def convergence_errors(
     errors = {}
     for name in changes[0]:
         known = [change[name] for change in changes if name in change]
-        errors[name] = convergence_error(*known, ratio=ratio, order=order)
+        errors[name] = convergence_error(*known, ratio=ratio, order=order, max_order=max_order)
         if steps is not None:
             errors[name] += find_definition(name).sample_error / steps
     min_load = values[0].get("normal_load_least", 0.0)

@@ -24,7 +24,8 @@ from ..model.model import Model
 from ..model.source import Source, locate_errors
 from ..model.structure import compute_sticking_stiffness
 from ..slip.edge_springs import add_edge_springs
-from .patch import area_slip, mesh_levels, store
+from .patch import mesh_levels, store
+from .patch.jenkins_elements import compute_stick_stiffness
 from .patch.press import Patch, Patches
 
 # Largest logarithm of the factor by which the compliance of a patch is scaled.
@@ -184,7 +185,9 @@ def compute_full_stick_stiffness(model: Model, patch) -> float:
         return 0.0
     if not model.partial_slip:
         return compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
-    return _sum_nodal_forces(patch, 1.0, _find_bond_length(model, load) / model.friction.static)
+    return compute_stick_stiffness(
+        patch, 1.0, _find_bond_length(model, load) / model.friction.static
+    )
 
 
 def _find_bond_length(model: Model, load: float) -> float:
@@ -220,33 +223,10 @@ def _find_stick_stiffness(model: Model, patches: Sequence) -> StickStiffness | N
 
     touching = [patch for patch in solved[:3] if patch.pressure.load > 0]
     bond_length = length / model.friction.static
-    values = [_sum_nodal_forces(patch, 1.0, bond_length) for patch in touching]
+    values = [compute_stick_stiffness(patch, bond_length=bond_length) for patch in touching]
     changes = np.abs(np.diff(values))
     error = float(convergence_error(*changes)) if changes.size else 0.0
     return StickStiffness(values[0], error, bond_length)
-
-
-def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
-    """Return the sum of the nodal forces [N] of a patch in full stick at a displacement of 1 m.
-
-    The node i has the spring F_i/bond_length in series with the compliance, where F_i is its normal force [N].
-
-    Parameters
-    ----------
-    patch : Patch
-        Solved patch in partial contact or full contact.
-    factor : float
-        Factor of the tangential compliance.
-    bond_length : float
-        Bond length of the law over its coefficient of friction [m].
-    """
-    if patch.model.area is not None:
-        return area_slip.compute_stick_stiffness(patch, factor, bond_length)
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    points = np.flatnonzero(force > 0)
-    nodal = factor * patch.slip_compliance[np.ix_(points, points)]
-    nodal += np.diag(bond_length / force[points])
-    return float(np.linalg.solve(nodal, np.ones(points.size)).sum())
 
 
 def _match_stiffness(
@@ -282,7 +262,7 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
 
     def excess(log_factor: float) -> float:
         """Return the relative excess of the stiffness for a scaled compliance."""
-        return _sum_nodal_forces(patch, np.exp(log_factor), bond_length) / stiffness - 1
+        return compute_stick_stiffness(patch, np.exp(log_factor), bond_length) / stiffness - 1
 
     if not excess(-MAX_LOG_COMPLIANCE_FACTOR) > 0 > excess(MAX_LOG_COMPLIANCE_FACTOR):
         return patch.slip_compliance

@@ -266,7 +266,7 @@ class _Passes:
         if run_plan.kind != "patch":
             result = _add_static_measures(result, moved.faces)
             if run_plan.model.patch is not None and run_plan.model.patch.area is not None:
-                result = area_motion.add_reversal_measure(result, moved.coarse[0])
+                result = area_motion.add_reversal_measure(result, moved.coarse)
         if run_plan.model.wear is not None:
             result = measures.add_wear_measures(
                 replace(result, plan=run_plan), worn_patch, self.estimate

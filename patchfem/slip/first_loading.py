@@ -1,34 +1,42 @@
-"""Partial slip over the cells of a face: first loading, parallel elements, shear modes, states at a reversal.
+"""Partial slip over the cells of a face: first loading, parallel elements, shear modes, state at a reversal.
 
 Cells yield at fixed tractions. Slip zones only grow within a stroke, so each displacement of the first loading is one
 bounded problem from rest, and Masing's rule gives the other strokes.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ..contact.bounded import BoundedProblem, BoundedSolution, solve_bounded
+from ..contact.cells import CellCompliance
 from ..core import NotConverged, PatchfemError, frozen_array
-from .shear_modes import ShearModes
+from . import shear_modes
 
 OPEN = 0  # State of a cell without contact
 STICK = 1  # State of a cell in contact below its friction limit
 SLIP = 2  # State of a cell at its friction limit
+# Number of displacements of the first loading, 12 to 24, between which the force is a monotone cubic
+N_LOADING_LEVELS = 16
+N_SLIDERS = 256  # Number of yield displacements of the parallel elements
 # Largest wrong displacement of a cell, relative to the largest one; the error of the force is about its square
-SLIP_RESIDUAL_TOL = 1e-6
-MAX_ITERATIONS = (
-    2000  # Largest number of steps of the solver for one displacement; it takes about 15
-)
+SLIP_RESIDUAL_TOL = 1e-7
+# Largest number of steps of the solver for one displacement; it takes about 15
+MAX_ITERATIONS = 2000
 # Smallest stiffness of an element relative to their sum; smaller ones are rounding errors of the slope of a curve
 MIN_STIFFNESS_RATIO = 1e-12
+N_CELL_MODES = 12  # Number of shear modes with which a face starts
+MAX_CELL_MODES = 64  # Largest number of modes that the tolerance asks for
+# Ratio of the modes that are computed to those that are kept; the others show the error of leaving modes out
+COMPUTED_MODES_RATIO = 2
 
 
 class FirstLoading(NamedTuple):
     """First loading of a face from rest to gross slip at n displacements of the holder.
 
     - displacement (n + 1,): Displacements [m] from 0 to gross slip.
-    - force (n + 1,): Friction force [N] at them.
+    - force (n + 1, a): Friction forces [N] of the cells in contact.
     """
 
     displacement: np.ndarray
@@ -38,40 +46,101 @@ class FirstLoading(NamedTuple):
 class SpringSliders(NamedTuple):
     """Parallel springs in series with sliders that have the curve of a first loading.
 
-    - stiffness (k,): [N/m].
-    - yield_displacement (k,): [m], increasing.
+    - stiffness (t,): [N/m].
+    - yield_displacement (t,): [m], increasing.
     """
 
     stiffness: np.ndarray
     yield_displacement: np.ndarray
 
 
-class ReversalState(NamedTuple):
-    """State of the cells at the reversal of steady cycles with a displacement amplitude.
+class LevelForces:
+    """Forces of cells as a linear function of the stretches of parallel elements, like a matrix (a, t).
 
-    - traction (ny, nx): Shear traction [Pa] of the cells.
-    - slip (ny, nx): Slip of the first loading up to the amplitude [m]; a steady cycle slips four times as far.
-    - state (ny, nx): OPEN, STICK or SLIP.
-    - force: Friction force [N].
-    """
-
-    traction: np.ndarray
-    slip: np.ndarray
-    state: np.ndarray
-    force: float
-
-
-def find_first_loading(shear, limit: np.ndarray, n_displacements: int = 16) -> FirstLoading:
-    """Find the force over the displacement of the holder, from rest to gross slip.
+    By Masing's rule every state is a superposition of first loadings: between two displacements of the first loading, each
+    cell gets its part of the force of the elements that yield between them. So the forces of the cells add up to that of
+    the elements.
 
     Parameters
     ----------
-    shear : CellCompliance
+    loading : FirstLoading
+        First loading of the a cells.
+    sliders : SpringSliders
+        The t elements that have its curve.
+    """
+
+    def __init__(self, loading: FirstLoading, sliders: SpringSliders):
+        displacement, force = loading
+        stiffness, yields = sliders
+        self.change = np.diff(force, axis=0)
+        self.limit = force[-1]
+        self.yield_steps = np.diff(yields, prepend=0.0)
+
+        # Part of the force between two displacements that is carried between two yields, where the slope of the curve is
+        # the stiffness of the elements that still stick
+        slope = np.cumsum(stiffness[::-1])[::-1]
+        edges = np.union1d(displacement, yields)
+        middle = (edges[1:] + edges[:-1]) / 2
+        element = np.minimum(np.searchsorted(yields, middle), yields.size - 1)
+        carried = np.zeros((len(self.change), yields.size))
+        level = np.searchsorted(displacement[1:-1], middle)
+        np.add.at(carried, (level, element), slope[element] * np.diff(edges))
+        self.fractions = carried / carried.sum(axis=1, keepdims=True)
+
+    def __matmul__(self, stretch: np.ndarray) -> np.ndarray:
+        """Return the forces (a,) [N] of the cells at stretches (t,) [m] of the elements."""
+        factors = self.fractions @ (np.diff(stretch, prepend=0.0) / self.yield_steps)
+        # Beside a corner the traction of a sticking cell may fall a little while its neighbours slip
+        return np.clip(factors @ self.change, -self.limit, self.limit)
+
+
+@dataclass(frozen=True, eq=False)
+class CellElements:
+    """Parallel elements of a face whose cells yield at their friction limits, with the names of a `JenkinsSet`.
+
+    - compliance: Shear compliance of the cells.
+    - pressure_limit (ny, nx): Friction limits [Pa].
+    - points, limit (a,): Cells in contact, and their friction limits [N].
+    - loading: First loading of these cells.
+    - stiffness, yield_displacement (t,): [N/m] and [m].
+    - force_matrix: Forces of the cells in contact per stretch of the elements.
+    """
+
+    compliance: CellCompliance
+    pressure_limit: np.ndarray
+    points: np.ndarray
+    limit: np.ndarray
+    loading: FirstLoading
+    stiffness: np.ndarray
+    yield_displacement: np.ndarray
+    force_matrix: LevelForces
+
+
+class ReversalState(NamedTuple):
+    """State of m cells at the reversal of steady cycles.
+
+    - status (m,): OPEN, STICK or SLIP.
+    - slip_per_cycle (m,): Path of the slip of each cell in a cycle [m].
+    """
+
+    status: np.ndarray
+    slip_per_cycle: np.ndarray
+
+    @property
+    def stick_fraction(self) -> float:
+        """Fraction of the cells in contact that stick."""
+        return float((self.status[self.status != OPEN] == STICK).mean())
+
+
+def find_first_loading(compliance: CellCompliance, limit: np.ndarray) -> FirstLoading:
+    """Find the forces of the cells over the displacement of the holder, from rest to gross slip.
+
+    Parameters
+    ----------
+    compliance : CellCompliance
         Shear compliance of the cells.
     limit : (ny, nx) ndarray
         Friction limit [Pa] of each cell; 0 without contact.
-    n_displacements : int
-        Number of displacements, 12 to 24.
 
     Returns
     -------
@@ -81,15 +150,20 @@ def find_first_loading(shear, limit: np.ndarray, n_displacements: int = 16) -> F
     ------
     PatchfemError
         If no cell carries load.
+    NotConverged
+        If the tractions are not found.
     """
-    levels = compute_gross_slip(shear, limit) * _space_evenly_at_ends(n_displacements)
-    force = np.zeros(levels.size)
+    is_closed = limit > 0
+    if not is_closed.any():
+        raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
+    gross_slip = float(compliance.product(limit)[is_closed].max())
+    displacements = gross_slip * _space_evenly_at_ends(N_LOADING_LEVELS)
+    force = np.zeros((displacements.size, np.count_nonzero(is_closed)))
     traction = np.zeros(limit.shape)
-    for k, displacement in enumerate(levels):
-        if displacement > 0:
-            traction = _hold(shear, limit, displacement, traction).traction
-            force[k] = traction.sum() * shear.cell_area
-    return FirstLoading(frozen_array(levels), frozen_array(force))
+    for k, displacement in enumerate(displacements[1:], 1):
+        traction = slip_from_rest(compliance, limit, displacement, traction).traction
+        force[k] = traction[is_closed] * compliance.cell_area
+    return FirstLoading(frozen_array(displacements), frozen_array(force))
 
 
 def _space_evenly_at_ends(count: int) -> np.ndarray:
@@ -98,43 +172,43 @@ def _space_evenly_at_ends(count: int) -> np.ndarray:
     return s * s * (3 - 2 * s)
 
 
-def compute_gross_slip(shear, limit: np.ndarray) -> float:
-    """Compute the displacement [m] of the holder at which the last cell slips.
+def slip_from_rest(
+    compliance: CellCompliance, limit: np.ndarray, displacement: float, start=None
+) -> BoundedSolution:
+    """Solve for the shear tractions after a first loading to a displacement of the holder.
+
+    Slip zones only grow in it, so the way does not matter: the elastic energy minus the work of the holder is least.
 
     Parameters
     ----------
-    shear : CellCompliance
+    compliance : CellCompliance
         Shear compliance of the cells.
     limit : (ny, nx) ndarray
-        Friction limit [Pa] of each cell; 0 without contact.
+        Friction limits [Pa].
+    displacement : float
+        Displacement of the holder [m].
+    start : (ny, nx) ndarray, optional
+        Traction [Pa] from which the solution starts.
+
+    Returns
+    -------
+    BoundedSolution
+        Its slope is minus the slip.
 
     Raises
     ------
-    PatchfemError
-        If no cell carries load.
+    NotConverged
+        If the tractions are not found.
     """
-    if not (limit > 0).any():
-        raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
-    return float(shear.product(limit)[limit > 0].max())
+    # Rigid pieces on a spring share its force by their limits
+    if compliance.is_rigid:
+        gross_slip = compliance.product(limit).max()
+        traction = min(displacement / gross_slip, 1.0) * limit
+        slope = compliance.product(traction) - displacement
+        return BoundedSolution(traction, np.zeros(0), slope, 0, 0.0)
 
-
-def _hold(shear, limit: np.ndarray, displacement: float, start: np.ndarray) -> BoundedSolution:
-    """Solve for the shear traction after a first loading to a displacement [m] of the holder.
-
-    Slip zones only grow in it, so the way does not matter: the elastic energy minus the work of the holder is least. The
-    slope of the solution is minus the slip.
-
-    Parameters
-    ----------
-    shear : CellCompliance
-        Shear compliance of the cells.
-    limit, start : (ny, nx) ndarray
-        Friction limit, and traction from which the solution starts [Pa].
-    displacement : float
-        Displacement of the holder [m].
-    """
     problem = BoundedProblem(np.full(limit.shape, -displacement), -limit, limit)
-    solution = solve_bounded(shear, problem, start, SLIP_RESIDUAL_TOL, MAX_ITERATIONS)
+    solution = solve_bounded(compliance, problem, start, SLIP_RESIDUAL_TOL, MAX_ITERATIONS)
     if not solution.residual <= SLIP_RESIDUAL_TOL:
         raise NotConverged(
             f"contact: partial slip did not converge; after {MAX_ITERATIONS} steps the displacement "
@@ -143,15 +217,13 @@ def _hold(shear, limit: np.ndarray, displacement: float, start: np.ndarray) -> B
     return solution
 
 
-def make_spring_sliders(first_loading: FirstLoading, count: int = 256) -> SpringSliders:
-    """Make parallel elements whose first loading is a given curve.
+def make_spring_sliders(displacement, force) -> SpringSliders:
+    """Make parallel elements whose first loading is a given curve, interpolated by monotone cubics.
 
     Parameters
     ----------
-    first_loading : FirstLoading
-        Curve, interpolated by monotone cubics.
-    count : int
-        Number of yield displacements.
+    displacement, force : (n + 1,) ndarray
+        Displacements [m] from 0 to gross slip, and forces [N] at them.
 
     Returns
     -------
@@ -159,8 +231,7 @@ def make_spring_sliders(first_loading: FirstLoading, count: int = 256) -> Spring
     """
     from scipy.interpolate import PchipInterpolator
 
-    displacement, force = first_loading
-    knots = displacement[-1] * _space_evenly_at_ends(count)
+    knots = displacement[-1] * _space_evenly_at_ends(N_SLIDERS)
     slopes = np.diff(PchipInterpolator(displacement, force)(knots)) / np.diff(knots)
     # A slope that would rise again is the round-off of the interpolation
     slopes = np.minimum.accumulate(np.maximum(slopes, 0.0))
@@ -174,43 +245,81 @@ def make_spring_sliders(first_loading: FirstLoading, count: int = 256) -> Spring
     )
 
 
-def find_reversal_state(shear, limit: np.ndarray, amplitude: float) -> ReversalState:
-    """Find traction, slip and state of the cells at the reversal of a steady cycle.
+def make_cell_elements(compliance: CellCompliance, limit: np.ndarray) -> CellElements:
+    """Make the parallel elements of a face whose cells yield at their friction limits.
 
     Parameters
     ----------
-    shear : CellCompliance
+    compliance : CellCompliance
         Shear compliance of the cells.
     limit : (ny, nx) ndarray
-        Friction limit [Pa] of each cell; 0 without contact.
-    amplitude : float
-        Amplitude of the displacement of the holder [m].
+        Friction limits [Pa].
 
-    Returns
-    -------
-    ReversalState
+    Raises
+    ------
+    PatchfemError
+        If no cell carries load.
+    NotConverged
+        If the tractions are not found.
     """
-    solution = _hold(shear, limit, amplitude, np.zeros(limit.shape))
-    is_open = limit == 0
-    is_sticking = np.abs(solution.traction) < limit
-    state = np.where(is_sticking, STICK, SLIP)
-    state[is_open] = OPEN
-    slip = np.where(state == SLIP, np.maximum(-solution.slope, 0.0), 0.0)
-    force = float(solution.traction.sum() * shear.cell_area)
-    return ReversalState(solution.traction, slip, state, force)
+    loading = find_first_loading(compliance, limit)
+    sliders = make_spring_sliders(loading.displacement, loading.force.sum(axis=1))
+    points = np.flatnonzero(limit > 0)
+    force_limit = limit.ravel()[points] * compliance.cell_area
+    forces = LevelForces(loading, sliders)
+    return CellElements(compliance, limit, points, force_limit, loading, *sliders, forces)
 
 
-def find_shear_modes(shear, limit: np.ndarray, n_modes: int) -> ShearModes:
-    """Find the most compliant modes of D^1/2 C D^1/2, with D the friction limits [N] of the cells in contact.
+def list_band_sliders(
+    elements: CellElements, bands: np.ndarray, n_bands: int
+) -> list[SpringSliders]:
+    """Return the elements of bands of a face, each with its part of the force while the whole face slides.
 
     Parameters
     ----------
-    shear : CellCompliance
+    elements : CellElements
+        Elements of the whole face.
+    bands : (m,) ndarray
+        Number of the band of each cell.
+    n_bands : int
+        Number of bands; one without load yields at once.
+    """
+    displacement, force = elements.loading
+    out = []
+    for band in range(n_bands):
+        own = force[:, bands[elements.points] == band].sum(axis=1)
+        if own[-1] > 0:
+            out.append(make_spring_sliders(displacement, own))
+        else:
+            out.append(SpringSliders(np.ones(1), np.zeros(1)))
+    return out
+
+
+def find_reversal(elements: CellElements, amplitude: float) -> ReversalState:
+    """Find the state of a face at the reversal of steady cycles with a displacement amplitude [m].
+
+    In a steady cycle each stroke slips twice as far as the first loading to the amplitude (Masing).
+    """
+    limit = elements.pressure_limit
+    solution = slip_from_rest(elements.compliance, limit, amplitude)
+    is_closed = limit > 0
+    slips = is_closed & (np.abs(solution.traction) >= limit)
+    slip = np.where(slips, np.maximum(-solution.slope, 0.0), 0.0)
+    status = np.where(is_closed, STICK, OPEN) + slips
+    return ReversalState(status.ravel().astype(np.int8), 4 * slip.ravel())
+
+
+def find_cell_modes(compliance: CellCompliance, limit: np.ndarray, n_modes: int):
+    """Find the most compliant modes of D^1/2 C D^1/2, with D the friction limits of the cells in contact.
+
+    Parameters
+    ----------
+    compliance : CellCompliance
         Shear compliance C of the cells.
-    limit : (ny, nx) ndarray
-        Friction limit [Pa] of each cell; 0 without contact.
+    limit : (m,) ndarray
+        Friction limit [N] of each cell; 0 without contact.
     n_modes : int
-        Number of modes, at most that of the cells in contact.
+        Number of modes; fewer are found if the pieces are rigid or fewer cells are in contact.
 
     Returns
     -------
@@ -219,16 +328,15 @@ def find_shear_modes(shear, limit: np.ndarray, n_modes: int) -> ShearModes:
     """
     from scipy.sparse.linalg import LinearOperator, eigsh
 
+    n_modes = 1 if compliance.is_rigid else n_modes
     points = np.flatnonzero(limit > 0)
-    force = limit.ravel()[points] * shear.cell_area
-    root = np.sqrt(force)
+    root = np.sqrt(limit[points])
+    force = np.zeros(limit.size)
 
     def apply(vector: np.ndarray) -> np.ndarray:
         """Return D^1/2 C D^1/2 times a vector of the cells in contact."""
-        traction = np.zeros(limit.size)
-        traction[points] = root * vector.ravel() / shear.cell_area
-        displacement = shear.product(traction.reshape(limit.shape))
-        return root * displacement.ravel()[points]
+        force[points] = root * vector.ravel()
+        return root * (compliance @ force)[points]
 
     # The method of Lanczos needs more cells than modes; a few cells give the whole matrix
     if points.size <= 2 * n_modes + 1:
@@ -238,9 +346,41 @@ def find_shear_modes(shear, limit: np.ndarray, n_modes: int) -> ShearModes:
         operator = LinearOperator((points.size, points.size), apply, dtype=float)
         eigenvalues, vectors = eigsh(operator, n_modes, which="LA", v0=root)
     order = np.argsort(eigenvalues)[::-1][:n_modes]
-    return ShearModes(
+    return shear_modes.ShearModes(
         frozen_array(points, np.int64),
-        frozen_array(force),
+        frozen_array(limit[points]),
         frozen_array(vectors[:, order] / root[:, None]),
         frozen_array(1 / eigenvalues[order]),
     )
+
+
+def find_sufficient_cell_modes(
+    compliance: CellCompliance, limit: np.ndarray, bond_length: float, tolerance: float
+):
+    """Find as many of the most compliant modes as the friction force of a face needs to meet a tolerance.
+
+    Twice as many modes are computed as are kept, and the others show the error of the force
+    (`shear_modes.estimate_force_errors`).
+
+    Parameters
+    ----------
+    compliance : CellCompliance
+        Shear compliance of the cells.
+    limit : (m,) ndarray
+        Friction limit [N] of each cell.
+    bond_length : float
+        Displacement [m] over which a cell reaches its limit.
+    tolerance : float
+        Largest error of the friction force on first loading / friction limit.
+
+    Returns
+    -------
+    ShearModes
+    """
+    count = N_CELL_MODES
+    while True:
+        modes = find_cell_modes(compliance, limit, COMPUTED_MODES_RATIO * count)
+        is_last = 2 * count > MAX_CELL_MODES or modes.stiffness.size < COMPUTED_MODES_RATIO * count
+        if is_last or shear_modes.estimate_force_errors(modes, bond_length)[count] <= tolerance:
+            return modes.select(count)
+        count *= 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,10 +16,10 @@ from patchfem.elasticity import BlockShape, Layers, make_stack, sides
 from patchfem.slip.first_loading import (
     SLIP,
     STICK,
-    find_first_loading,
-    find_reversal_state,
-    find_shear_modes,
-    make_spring_sliders,
+    find_cell_modes,
+    find_reversal,
+    make_cell_elements,
+    slip_from_rest,
 )
 
 LENGTH, HEIGHT, LOAD = 12.7e-3, 6.35e-3, 115.6538
@@ -245,20 +246,20 @@ def test_refuses_hardness_that_cannot_carry_the_load():
 
 
 @cache
-def get_first_loading():
-    """Return the compliance, friction limits and first loading of a face with both tilts."""
+def get_elements():
+    """Return the parallel elements of a face with both tilts."""
     block, pressed = press_square(lambda x, y: ROLL * (x + y), (128, 128))
-    limit = 0.3 * pressed.pressure
-    return block.shear, limit, find_first_loading(block.shear, limit)
+    return make_cell_elements(block.shear, 0.3 * pressed.pressure)
 
 
 def test_exact_first_loading_is_concave_and_ends_at_the_limit():
     """9: The curve begins with the stiffness of the set, is concave, and ends at the friction limit."""
-    shear, limit, curve = get_first_loading()
-    slopes = np.diff(curve.force) / np.diff(curve.displacement)
-    assert curve.force[-1] == pytest.approx(0.3 * LOAD, rel=1e-9)
-    stiffness = make_spring_sliders(curve).stiffness.sum()
-    assert stiffness == pytest.approx(compute_set_stiffness(shear, limit > 0), rel=5e-3)
+    elements = get_elements()
+    displacement, force = elements.loading
+    slopes = np.diff(force.sum(axis=1)) / np.diff(displacement)
+    assert force[-1].sum() == pytest.approx(0.3 * LOAD, rel=1e-9)
+    stiffness = compute_set_stiffness(elements.compliance, elements.pressure_limit > 0)
+    assert elements.stiffness.sum() == pytest.approx(stiffness, rel=5e-3)
     assert (np.diff(slopes) < 0).all() and slopes[-1] > 0
 
 
@@ -266,16 +267,17 @@ def test_exact_masing_loop_agrees_with_stepped_cycle(n_steps=12):
     """10: The loop area by elements is that of a cycle in steps, each from the slip before, within .1 %."""
     from patchfem.contact.bounded import BoundedProblem, solve_bounded
 
-    shear, limit, curve = get_first_loading()
-    amplitude = curve.displacement[-1] / 2
-    sliders = make_spring_sliders(curve)
-    passed = np.maximum(amplitude - sliders.yield_displacement, 0.0)
-    loop = 4 * (sliders.stiffness * sliders.yield_displacement) @ passed
+    elements = get_elements()
+    shear = elements.compliance
+    limit = elements.pressure_limit
+    amplitude = elements.yield_displacement[-1] / 2
+    passed = np.maximum(amplitude - elements.yield_displacement, 0.0)
+    loop = 4 * (elements.stiffness * elements.yield_displacement) @ passed
 
     # One half cycle from the reversal; the other is its mirror image. The work is that of the friction force.
-    state = find_reversal_state(shear, limit, amplitude)
-    traction = state.traction
-    slip = state.slip
+    first = slip_from_rest(shear, limit, amplitude)
+    traction = first.traction
+    slip = find_reversal(elements, amplitude).slip_per_cycle.reshape(limit.shape) / 4
     dissipated = 0.0
     for displacement in np.linspace(amplitude, -amplitude, n_steps + 1)[1:]:
         problem = BoundedProblem(slip - displacement, -limit, limit)
@@ -285,33 +287,51 @@ def test_exact_masing_loop_agrees_with_stepped_cycle(n_steps=12):
         dissipated += np.vdot(found.traction, step) * shear.cell_area
         slip = slip + step
         traction = found.traction
-    assert traction == pytest.approx(-state.traction, abs=1e-3 * limit.max())
+    assert traction == pytest.approx(-first.traction, abs=1e-3 * limit.max())
     assert 2 * dissipated == pytest.approx(loop, rel=1e-3)
 
 
 def test_exact_states_at_a_reversal():
     """Slipping cells are at their limit and slip forward, sticking ones do not slip, and open ones carry nothing."""
-    shear, limit, curve = get_first_loading()
-    state = find_reversal_state(shear, limit, curve.displacement[-1] / 3)
-    slips = state.state == SLIP
-    sticks = state.state == STICK
+    elements = get_elements()
+    limit = elements.pressure_limit.ravel()
+    amplitude = elements.yield_displacement[-1] / 3
+    traction = slip_from_rest(elements.compliance, elements.pressure_limit, amplitude).traction
+    state = find_reversal(elements, amplitude)
+    slips = state.status == SLIP
+    sticks = state.status == STICK
     assert (slips | sticks).sum() == (limit > 0).sum() and slips.any() and sticks.any()
-    assert state.traction[slips] == pytest.approx(limit[slips])
-    assert not state.slip[~slips].any() and (state.slip[slips] >= 0).all()
-    assert state.force == pytest.approx(np.interp(curve.displacement[-1] / 3, *curve), rel=5e-3)
+    assert traction.ravel()[slips] == pytest.approx(limit[slips])
+    assert not state.slip_per_cycle[~slips].any() and (state.slip_per_cycle[slips] >= 0).all()
+    force = np.minimum(amplitude, elements.yield_displacement) @ elements.stiffness
+    assert traction.sum() * elements.compliance.cell_area == pytest.approx(force, rel=5e-3)
 
 
 def test_exact_shear_modes_diagonalise_the_compliance(n_modes=6):
     """Shapes are orthonormal with the limits, and stiffness times compliance reproduces them."""
-    shear, limit, _ = get_first_loading()
-    modes = find_shear_modes(shear, limit, n_modes)
+    elements = get_elements()
+    shear = elements.compliance
+    modes = find_cell_modes(shear, elements.pressure_limit.ravel() * shear.cell_area, n_modes)
     weighted = modes.limit[:, None] * modes.shape
     assert modes.shape.T @ weighted == pytest.approx(np.eye(n_modes), abs=1e-9)
     for shape, force, stiffness in zip(modes.shape.T, weighted.T, modes.stiffness):
-        traction = np.zeros(limit.size)
-        traction[modes.points] = force / shear.cell_area
-        moved = shear.product(traction.reshape(limit.shape)).ravel()[modes.points]
+        forces = np.zeros(elements.pressure_limit.size)
+        forces[modes.points] = force
+        moved = (shear @ forces)[modes.points]
         assert stiffness * moved == pytest.approx(shape, abs=1e-7 * np.abs(shape).max())
+
+
+def test_exact_rigid_cells_on_a_spring_share_its_force():
+    """Cells of rigid pieces yield together, with the stiffness of the spring, and share its force by their limits."""
+    shear = get_block().shear
+    rigid = replace(shear, waves=np.zeros(shear.shape), sides=None).add_spring(1e-8)
+    limit = np.linspace(0.0, 1e6, shear.waves.size).reshape(shear.shape)
+    elements = make_cell_elements(rigid, limit)
+    assert elements.stiffness == pytest.approx([1e8])
+    forces = elements.force_matrix @ (elements.yield_displacement / 2)
+    assert forces == pytest.approx(elements.limit / 2)
+    assert compute_set_stiffness(rigid, limit > 0) == pytest.approx(1e8)
+    assert find_cell_modes(rigid, limit.ravel(), 4).stiffness.size == 1
 
 
 # ---- cache of the free sides

@@ -17,11 +17,7 @@ from patchfem.contact.waves import compute_wave_compliance
 from patchfem.elasticity import BlockShape, Layers, LayerStack, Piece, make_stack
 from patchfem.elasticity.elasticity import lame_constants
 from patchfem.mesh import TensorGrid
-from patchfem.slip.first_loading import (
-    find_first_loading,
-    find_reversal_state,
-    make_spring_sliders,
-)
+from patchfem.slip.first_loading import STICK, find_reversal, make_cell_elements
 
 LENGTH, HEIGHT, THICKNESS = 12.7e-3, 6.35e-3, 0.1524e-3
 LOAD = 100.0
@@ -312,23 +308,23 @@ def test_exact_cattaneo_mindlin(poisson, radius=0.01, friction=0.3, n_cells=128)
     )
     shear = make_open_cells((n_cells, n_cells), size, stack, "shear")
     limit = friction * pressed.pressure
-    curve = find_first_loading(shear, limit)
+    elements = make_cell_elements(shear, limit)
+    displacement, cell_force = elements.loading
 
     stiffness = 8 * half * mu / (2 * (2 - poisson))
     gross = 1.5 * friction * LOAD / stiffness
     load = friction * LOAD
-    exact = load * (1 - (1 - np.minimum(curve.displacement / gross, 1)) ** 1.5)
-    assert curve.displacement[-1] == pytest.approx(gross, rel=1e-3)
-    assert curve.force == pytest.approx(exact, abs=1e-4 * load)
+    exact = load * (1 - (1 - np.minimum(displacement / gross, 1)) ** 1.5)
+    assert displacement[-1] == pytest.approx(gross, rel=1e-3)
+    assert cell_force.sum(axis=1) == pytest.approx(exact, abs=1e-4 * load)
 
     # Loop of half the amplitude of gross slip, by Masing's rule
-    sliders = make_spring_sliders(curve)
     amplitude = gross / 2
-    passed = np.maximum(amplitude - sliders.yield_displacement, 0.0)
-    loop = 4 * (sliders.stiffness * sliders.yield_displacement) @ passed
+    passed = np.maximum(amplitude - elements.yield_displacement, 0.0)
+    loop = 4 * (elements.stiffness * elements.yield_displacement) @ passed
     force = load * (1 - 0.5**1.5)
     work = load * (amplitude - 0.4 * gross * (1 - 0.5**2.5))
     assert loop == pytest.approx(8 * (work - force * amplitude / 2), rel=1e-3)
-    state = find_reversal_state(shear, limit, amplitude)
-    stick = np.sqrt((state.state == 1).sum() * cells.cell_area / np.pi)
+    status = find_reversal(elements, amplitude).status
+    stick = np.sqrt((status == STICK).sum() * cells.cell_area / np.pi)
     assert stick == pytest.approx(half * (1 - force / load) ** (1 / 3), rel=0.015)

@@ -54,7 +54,8 @@ def test_exact_bands_of_a_face_wear_by_their_own_slip():
     is_last = result.window.time >= result.window.time[-1] - (1 + 1e-9) * period
     amplitudes = np.ptp(slides[is_last], axis=0) / 2
     volumes = np.bincount(
-        number_bands(result.patch), result.fields["worn_depth"][-1] * result.patch.weight
+        number_bands(result.patch),
+        result.fields["worn_depth"][-1] * result.patch.pieces.interface.weight,
     )
     assert np.ptp(amplitudes) > 1e-2 * amplitudes.mean()
     expected = 1e-14 * compute_band_loads(result.patch) * 4 * amplitudes * 1e3

@@ -26,6 +26,7 @@ class Cells:
 
     size: tuple[float, float]
     waves: np.ndarray
+    is_rigid = False
 
     @property
     def shape(self):

@@ -258,7 +258,7 @@ def make_points(
     # Rigid friction and that of a speed have the compliance of the modes left out.
     own = 0.0
     if keys.law in laws.STIFF_LAWS:
-        diagonal = shear.find_own_compliance(surface.soft)[modes.points]
+        diagonal = surface.soft.slip_compliance.diagonal()[modes.points]
         modes, own = shear_modes.share_rest(modes, diagonal)
     point_law = _make_law_points(surface, law, force[modes.points], own)
     return _make_point_set(surface, point_law, modes.points if moves else None, modes)

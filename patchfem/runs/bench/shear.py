@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...slip import shear_modes
-from ..patch import area_slip
+from ...slip import first_loading, shear_modes
 
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
 # pressure.
@@ -80,10 +79,10 @@ def choose_modes(
         length = MIN_BOND_LENGTH_RATIO * float(limit @ (compliance @ limit) / limit.sum())
     bound = SHEAR_MODES_ERROR_RATIO * tolerance
     if patch.model.area is not None:
-        count = n_modes or area_slip.N_AREA_MODES
-        modes = area_slip.choose_area_modes(
-            patch, limit, length, count, None if n_modes is not None else bound
-        )
+        if n_modes is not None:
+            modes = first_loading.find_cell_modes(compliance, limit, n_modes)
+        else:
+            modes = first_loading.find_sufficient_cell_modes(compliance, limit, length, bound)
         shear_modes.require_stability(modes, softness.fall)
         return modes
     if n_modes is not None:
@@ -97,17 +96,6 @@ def choose_modes(
         softness.fall,
         softness.max_modes,
     )
-
-
-def find_own_compliance(patch) -> np.ndarray:
-    """Return the shear displacement (m,) [m/N] of each node of a patch under a force of its own."""
-    compliance = patch.slip_compliance
-    if patch.model.area is None:
-        return np.diag(compliance)
-    own = compliance.holder
-    if compliance.cells is not None:
-        own += compliance.cells.self_compliance / compliance.weight
-    return np.full(patch.x.size, compliance.factor * own)
 
 
 def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndarray]:

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...slip import shear_modes
-from . import area_slip, store
+from ...contact import cells, press_cells, stiffness
+from ...slip import first_loading, shear_modes
+from . import store
 from .press import Patch
 
 
@@ -41,10 +42,12 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
 
     def make():
         """Make the elements, which the cache keeps for all runs of the patch."""
+        compliance = patch.slip_compliance
         if patch.model.area is not None:
-            return area_slip.make_area_elements(patch, static, length)
-        limit = static * patch.pressure.sigma_n * patch.pieces.interface.weight
-        return shear_modes.make_jenkins_set(patch.slip_compliance, limit, length)
+            limit = static * np.reshape(patch.normal_stress, patch.shape)
+            return first_loading.make_cell_elements(add_bonds(compliance, limit, length), limit)
+        limit = static * patch.normal_stress * patch.pieces.interface.weight
+        return shear_modes.make_jenkins_set(compliance, limit, length)
 
     return store.get_or_compute(("elements", patch, static, length), make)
 
@@ -65,3 +68,46 @@ def make_elements(patch: Patch, static: float, length: float) -> PatchElements:
         return PatchElements(np.ones(1), np.zeros(1))
     found = elements(patch, static, length)
     return PatchElements(found.stiffness, found.yield_displacement, found)
+
+
+def add_bonds(
+    compliance: "cells.CellCompliance", limit: np.ndarray, length: float
+) -> "cells.CellCompliance":
+    """Return the shear compliance of cells in series with the bonds of a law.
+
+    Parameters
+    ----------
+    compliance : CellCompliance
+        Shear compliance of the cells.
+    limit : (ny, nx) ndarray
+        Friction limits [Pa].
+    length : float
+        Displacement of the bonds [m] at which a cell reaches its limit; 0 for rigid friction.
+    """
+    if not length:
+        return compliance
+    return compliance.soften(np.divide(length, limit, out=np.zeros(limit.shape), where=limit > 0))
+
+
+def compute_stick_stiffness(patch: Patch, factor: float = 1.0, bond_length: float = 0.0) -> float:
+    """Compute the tangential stiffness [N/m] of a loaded patch of which no node slips.
+
+    Parameters
+    ----------
+    patch : Patch
+        Solved patch.
+    factor : float
+        Factor of the shear compliance.
+    bond_length : float
+        Length of the bonds over the coefficient of friction [m]: a node with the normal force F has the spring
+        F/bond_length in series with the pieces.
+    """
+    if patch.model.area is not None:
+        pressure = np.reshape(patch.normal_stress, patch.shape)
+        compliance = add_bonds(patch.slip_compliance.scale(factor), pressure, bond_length)
+        return press_cells.compute_set_stiffness(compliance, pressure > 0)
+    force = patch.normal_stress * patch.pieces.interface.weight
+    points = np.flatnonzero(force > 0)
+    nodal = factor * patch.slip_compliance[np.ix_(points, points)]
+    nodal += np.diag(bond_length / force[points])
+    return stiffness.tangential_stiffness(nodal, np.ones(points.size, bool))

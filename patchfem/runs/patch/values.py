@@ -41,6 +41,21 @@ class EdgeValues(NamedTuple):
     rotational: np.ndarray
 
 
+class AcrossValues(NamedTuple):
+    """Values of a face whose pressure varies across the sliding direction.
+
+    - roll: rotation of the upper piece about x [rad].
+    - moment: moment of the pressure about x [N m].
+    - stiffness: derivative of the moment with respect to the roll [N m/rad].
+    - yielded_fraction: fraction of the face whose pressure is the hardness; None without a hardness.
+    """
+
+    roll: float
+    moment: float
+    stiffness: float
+    yielded_fraction: float | None
+
+
 def estimate_peak_pressure(x, sigma, node_fraction=None) -> np.ndarray:
     """Estimate the peak pressures (...) [Pa] of patches from their nodal pressures.
 
@@ -119,7 +134,14 @@ def _extrapolate_pressure_to_end(x, sigma) -> np.ndarray:
     return peak
 
 
-def assemble_static_values(length: float, area: float, state, peak, edge_values: EdgeValues):
+def assemble_static_values(
+    length: float,
+    area: float,
+    state,
+    peak,
+    edge_values: EdgeValues,
+    across: AcrossValues | None = None,
+):
     """Return the static measures by name, numbers or arrays (n,).
 
     Parameters
@@ -132,6 +154,8 @@ def assemble_static_values(length: float, area: float, state, peak, edge_values:
         Largest pressure [Pa].
     edge_values : EdgeValues
         Lengths and stiffnesses, which depend on the positions of the contact edges.
+    across : AcrossValues, optional
+        What only a face has.
 
     Returns
     -------
@@ -141,9 +165,10 @@ def assemble_static_values(length: float, area: float, state, peak, edge_values:
     is_loaded = state.load > 0
     load = np.where(is_loaded, state.load, 1.0)
     total = np.where(is_loaded, area * peak, 1.0)
-    return {
+    fraction = edge_values.length / length
+    values = {
         "normal_load": state.load,
-        "contact_fraction": edge_values.length / length,
+        "contact_fraction": fraction,
         "pressure_peak": peak,
         "moment": state.moment,
         "rotation": state.rotation,
@@ -155,6 +180,17 @@ def assemble_static_values(length: float, area: float, state, peak, edge_values:
         "tangential_stiffness": edge_values.tangential,
         "rotational_stiffness": edge_values.rotational,
     }
+    if across is not None:
+        values |= {
+            "contact_area": fraction * area,
+            "pressure_centre_y": across.moment / load * is_loaded,
+            "roll": across.roll,
+            "roll_moment": across.moment,
+            "roll_stiffness": across.stiffness,
+        }
+        if across.yielded_fraction is not None:
+            values["yielded_fraction"] = across.yielded_fraction
+    return values
 
 
 def compute_static_values(patch: Patch) -> Values:

@@ -19,7 +19,9 @@ def number_bands(patch) -> np.ndarray:
 
 def compute_band_loads(patch) -> np.ndarray:
     """Return the normal load (b,) [N] on each band of a face."""
-    return np.bincount(number_bands(patch), patch.normal_stress * patch.weight, N_YAW_BANDS)
+    return np.bincount(
+        number_bands(patch), patch.normal_stress * patch.pieces.interface.weight, N_YAW_BANDS
+    )
 
 
 def average_over_bands(run, patch):

@@ -23,7 +23,7 @@ from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
 from ...model.structure import N_YAW_BANDS
 from ..bench import averaged_law
-from ..patch import area_slip, faces, jenkins_elements
+from ..patch import faces, jenkins_elements
 from . import bands, bond_lists
 from .numerics import Numerics
 
@@ -214,7 +214,7 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
     if slide_apart:
         numbers = bands.number_bands(patch)
         found = jenkins_elements.elements(patch, static, length)
-        parts = area_slip.list_band_elements(found, numbers, N_YAW_BANDS)
+        parts = slip.first_loading.list_band_sliders(found, numbers, N_YAW_BANDS)
         return [(load, part) for part in parts]
     return [(load, jenkins_elements.make_elements(patch, static, length))]
 
