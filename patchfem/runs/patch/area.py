@@ -40,8 +40,8 @@ COARSE_SIDE_LEVEL = 0  # level of the bricks of the free sides of coarser grids
 # A boundary of cells counts this part of each of its sides too much (Yastrebov, Anciaux and Molinari, Tribology Letters
 # 65, 2017).
 BOUNDARY_SIDE_FRACTION = (np.pi - 1 + np.log(2)) / 24
-# Error of the number of cells in contact over the root of the number of sides at its boundary: two standard deviations of the
-# sum of as many errors that are even between -.5 and .5
+# Error of the number of cells in contact over the root of the number of sides at its boundary: two standard deviations of
+# the sum of as many errors that are even between -.5 and .5
 CELL_COUNT_ERROR = 0.5
 # Smallest error that is stated, relative to a value and to the larger terms whose difference it is; the contact is solved to
 # 1e-8 of the displacement
