@@ -42,16 +42,17 @@ def test_drawn_rigs(tolerance):
 
 
 @pytest.mark.slow
-def test_patches_on_rigs():
-    """The shipped rig with other laws, loads, shapes and oscillating loads, beside brute force."""
+@pytest.mark.parametrize("kind", ["rig", "bench"])
+def test_laws_with_effects(kind):
+    """Rigs and benches of every law with other loads, shapes, grooves and oscillating loads, beside brute force."""
     references = json.loads(scores.MARCH_REFERENCES.read_text("utf-8"))
     found = {}
     for scene in march_recipe.make_scenes():
-        if scene.kind == "rig":
+        if scene.kind == kind:
             text = scene.text if "[accuracy]" in scene.text else f"{scene.text}[accuracy]\n"
-            model = build(loads(f'{text}method = "march"\n'))
+            method = 'method = "march"\n' if kind == "rig" else ""
             reference = references[str(scene.seed)]
             found[scene.seed] = march_rigs.score_run(
-                model, reference["values"], reference["doubts"]
+                build(loads(text + method)), reference["values"], reference["doubts"]
             )
     assert_share_holds(found)

@@ -1,7 +1,7 @@
 """Method and sizes of a bench run.
 
-In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `BenchSizes`. A law without memory has a
-closed form. Recursion, bond lists and parallel elements use the compiled kernels of the rigs.
+In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `BenchSizes`. A law without memory has a closed form, and
+parallel elements obey Masing's rules; contact points and lists of bonds use the compiled kernels of the rigs.
 """
 
 from dataclasses import dataclass, replace

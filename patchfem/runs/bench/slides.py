@@ -1,24 +1,26 @@
-"""Response of an interface to the displacement of a bench: in closed form, or by contact points.
+"""Response of an interface to the displacement of a bench: in closed form, by Masing's rules, or by contact points.
 
 In: a `SlideTask`. Out: `SlideHistories`. The force of a law without memory is a fraction of the friction limit, which
-depends only on the direction or the speed of the motion. All other laws are contact points that follow the path
-(`points.slides`). Pieces that are rigid in shear give all points the same displacement; under a pressure that moves with
-the upper piece, one point under the whole load then has the resultant force.
+depends only on the direction or the speed of the motion. Parallel elements under a constant load obey Masing's rules. All
+other laws are contact points that follow the path. Pieces that are rigid in shear give all points the same displacement;
+under a pressure that moves with the upper piece, one point under the whole load then has the resultant force.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from ... import slip, time_steps
+from ... import slip
 from ...core import NotConverged
 from ...effects import law_has_trait
+from ...friction.laws.elastic_plastic import masing_loop
 from ...friction.record import make_law
-from ...points import contacts, slides
-from ...points.laws import make_point_law
+from ...points import slides
 from ..patch import jenkins_elements
-from . import averaged_law, contact_points, shear
+from . import averaged_law, contact_points, masing, shear
 from .engine import (
     CLOSED_FORM,
     PARALLEL_ELEMENTS,
@@ -108,9 +110,10 @@ def follow_path(task: SlideTask) -> SlideHistories:
     NotConverged
         If the force of a step has too large an error.
     """
-    if task.engine.method != CLOSED_FORM:
+    if task.engine.method not in (CLOSED_FORM, PARALLEL_ELEMENTS):
         return _follow_by_points(task)
-    histories = _follow_without_memory(task)
+    follow = _follow_without_memory if task.engine.method == CLOSED_FORM else _follow_elements
+    histories = follow(task)
     if task.progress is not None:
         task.progress(1.0)
     return histories
@@ -308,6 +311,54 @@ def stack_energies(work, stored, losses) -> np.ndarray:
     return np.stack([work, stored, dissipated, created])
 
 
+# ---- parallel elements
+
+
+def _follow_elements(task: SlideTask) -> SlideHistories:
+    """Compute the histories of parallel elements under a constant load by Masing's rules."""
+    model = task.model
+    patch = task.patch
+    friction = model.friction
+    frames = task.frames
+    slide = task.slide
+    load = task.compute_loads()
+    law = make_law(friction, load[0])
+    if not model.partial_slip:
+        elements = masing.Elements(partial(law.steady_loop, load[0]), friction.static * load[0])
+        history = masing.follow_masing(elements, slide)
+        tau, local = _distribute_evenly(task, history.force, history.slip)
+    else:
+        # The stretches of the elements in a frame follow from the reversals before it.
+        found = jenkins_elements.elements(patch, friction.static, law.length)
+        limit = float(found.stiffness @ found.yield_displacement)
+        loop = partial(masing_loop, found.stiffness, found.yield_displacement)
+        history = masing.follow_masing(masing.Elements(loop, limit), slide)
+        states = masing.find_stretches(found.yield_displacement, slide, frames)
+        tau, local = slip.fields.compute_element_fields(patch, found, states, law.length)
+
+    stored = history.work - history.loss
+    ledger = stack_energies(np.diff(history.work), stored, np.diff(history.loss))
+    return SlideHistories(history.force, load, history.slip, ledger, tau, local)
+
+
+def _distribute_evenly(task: SlideTask, force, local_slip) -> tuple[np.ndarray, np.ndarray]:
+    """Return traction (f, m) [Pa] and slip (f, m) [m] in the frames where the pressed nodes slip alike, in proportion to it.
+
+    Parameters
+    ----------
+    task : SlideTask
+        Frames and pressure.
+    force, local_slip : (k,) array
+        Friction force [N] and slip [m] at all samples.
+    """
+    frames = task.frames
+    sigma = task.evaluate_pressure(frames)
+    load = sigma @ task.weight
+    ratio = np.divide(force[frames], load, out=np.zeros_like(load), where=load > 0)
+    local = np.where(sigma > 0, local_slip[frames, None], task.slide[frames, None])
+    return ratio[:, None] * sigma, local
+
+
 # ---- contact points
 
 
@@ -315,11 +366,22 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     """Compute the histories of a law with memory by contact points along the path."""
     model = task.model
     patch = task.patch
-    contact, jenkins_set = _make_contact(task)
+    engine = task.engine
+    contact = contact_points.make_contact(
+        model, patch, engine.choice, has_half_cells=engine.has_half_cells
+    )
+
+    # Steps of equal durations are followed together; durations matter only to laws of the velocity.
+    load = task.compute_loads()
+    time = task.time
+    if _is_timeless(model):
+        time = np.arange(task.slide.size, dtype=float)
+        if contact.load is not None:
+            contact = replace(contact, load=partial(np.interp, xp=time, fp=load))
 
     # A long bond list is stopped by its guard before it takes too long.
     report = task.progress if contact.bond_sum is None else BondListGuard(task.progress)
-    motion = slides.follow(contact, task.time, task.slide, task.frames, task.say, report)
+    motion = slides.follow(contact, time, task.slide, task.frames, task.say, report)
     if motion.n_unsolved:
         raise NotConverged(
             f"in {motion.n_unsolved} time steps of the prescribed slide the friction force has an error "
@@ -328,20 +390,12 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
         )
 
     # Shear stress and local slip of the frames, by what represents the shear of the pieces.
-    load = task.compute_loads()
     local_slip = motion.slip
     frames = task.frames
-    if jenkins_set is not None:
-        states = [(snapshot.slide, snapshot.stretch) for snapshot in motion.snapshots]
-        length = make_law(model.friction).length
-        tau, local = slip.fields.compute_element_fields(patch, jenkins_set, states, length)
-    elif contact.point_sets[0].shear is not None or contact.pressure is not None:
+    if contact.point_sets[0].shear is not None or contact.pressure is not None:
         tau, local = shear.compute_point_fields(patch, contact, motion.snapshots)
     else:
-        ratio = np.divide(motion.force, load, out=np.zeros_like(load), where=load > 0)[frames]
-        sigma = task.evaluate_pressure(frames)
-        tau = ratio[:, None] * sigma
-        local = np.where(sigma > 0, local_slip[frames, None], task.slide[frames, None])
+        tau, local = _distribute_evenly(task, motion.force, local_slip)
 
     # The stretch of bonds on rigid pieces is that of their force, at most one bond length.
     is_rigid = not model.partial_slip and model.grooves is None
@@ -357,6 +411,13 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     return SlideHistories(motion.force, load, local_slip, ledger, tau, local, count)
 
 
+def _is_timeless(model) -> bool:
+    """Return whether the friction of a bench depends on the order of its samples, but not on their times."""
+    if law_has_trait(model.friction.law, "bonds"):
+        return not model.bonds.has_growth
+    return law_has_trait(model.friction.law, "timeless")
+
+
 def _find_stretch(task: SlideTask, force, load) -> np.ndarray:
     """Return the elastic stretch [m] of bonds: the bond length times the force relative to the friction limit.
 
@@ -370,29 +431,3 @@ def _find_stretch(task: SlideTask, force, load) -> np.ndarray:
     limit = task.model.friction.static * load
     share = np.divide(force, limit, out=np.zeros_like(force), where=limit > 0)
     return task.model.friction.bond_length * share
-
-
-def _make_contact(task: SlideTask):
-    """Return the contact points of a bench, and the JenkinsSet of pieces that are replaced by parallel elements, or None."""
-    model = task.model
-    friction = model.friction
-    engine = task.engine
-    row = np.zeros(0)
-    # Pieces that deform in shear are parallel Jenkins elements of the same slip curve.
-    if engine.method == PARALLEL_ELEMENTS and model.partial_slip:
-        length = make_law(friction).length
-        jenkins_set = jenkins_elements.elements(task.patch, friction.static, length)
-        yields = jenkins_set.yield_displacement
-        law = time_steps.laws.make_elements(jenkins_set.stiffness, yields)
-        point_sets = [contacts.PointSet(law, row)]
-        limit = float(law.limits.sum())
-        return contact_points.join_points(point_sets, limit, None, {}), jenkins_set
-
-    # Masing's rule has no error of cells.
-    if engine.method == PARALLEL_ELEMENTS and law_has_trait(friction.law, "cells"):
-        load = float(task.evaluate_pressure([0])[0] @ task.weight)
-        law = make_point_law(friction.law, make_law(friction, load), load)
-        return contacts.Contact([contacts.PointSet(law, row)], friction.static * load), None
-    half = engine.has_half_cells
-    contact = contact_points.make_contact(model, task.patch, engine.choice, has_half_cells=half)
-    return contact, None

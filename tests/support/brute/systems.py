@@ -25,6 +25,8 @@ UNITS = {
 N_SLIDER_CELLS = (
     120  # cells of law "iwan"; the curve of first loading is wrong by 1/(8 120^2) of the limit
 )
+# Relative distance of the largest sample from the peak of a force that follows a load of two periods per cycle
+SAMPLED_PEAK = 2e-6
 MEASURES = ("loop_area", "relative_displacement_amplitude", "friction_force_peak")
 
 
@@ -69,6 +71,8 @@ def find_reference(text: str, steps_per_cycle: int) -> Reference:
         change = value - coarse[name]
         earlier = coarse[name] - coarsest[name]
         doubts[name] = max(abs(change), 0.5 * abs(earlier))
+        if name == "friction_force_peak":
+            doubts[name] = max(doubts[name], SAMPLED_PEAK * abs(value))
         if change and 1.6 < earlier / change < 2.5:
             values[name] = value + change
             doubts[name] = abs(change)
