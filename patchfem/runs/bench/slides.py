@@ -2,7 +2,7 @@
 
 In: a `SlideTask`. Out: `SlideHistories`. The force of a law without memory is a fraction of the friction limit, which
 depends only on the direction or the speed of the motion. All other laws are contact points that follow the path
-(`points.slides`). Pieces that are rigid in shear give all points the same displacement; under a pressure that moves with
+(`time_steps.slides`). Pieces that are rigid in shear give all points the same displacement; under a pressure that moves with
 the upper piece, one point under the whole load then has the resultant force.
 """
 
@@ -15,8 +15,7 @@ from ... import slip, time_steps
 from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.record import make_law
-from ...points import contacts, slides
-from ...points.laws import make_point_law
+from ...time_steps import slides
 from ..patch import jenkins_elements
 from . import averaged_law, contact_points, shear
 from .engine import (
@@ -377,22 +376,18 @@ def _make_contact(task: SlideTask):
     model = task.model
     friction = model.friction
     engine = task.engine
-    row = np.zeros(0)
+
     # Pieces that deform in shear are parallel Jenkins elements of the same slip curve.
     if engine.method == PARALLEL_ELEMENTS and model.partial_slip:
         length = make_law(friction).length
         jenkins_set = jenkins_elements.elements(task.patch, friction.static, length)
         yields = jenkins_set.yield_displacement
         law = time_steps.laws.make_elements(jenkins_set.stiffness, yields)
-        point_sets = [contacts.PointSet(law, row)]
+        point_sets = [time_steps.contacts.PointSet(law, np.zeros(0))]
         limit = float(law.limits.sum())
         return contact_points.join_points(point_sets, limit, None, {}), jenkins_set
 
-    # Masing's rule has no error of cells.
-    if engine.method == PARALLEL_ELEMENTS and law_has_trait(friction.law, "cells"):
-        load = float(task.evaluate_pressure([0])[0] @ task.weight)
-        law = make_point_law(friction.law, make_law(friction, load), load)
-        return contacts.Contact([contacts.PointSet(law, row)], friction.static * load), None
-    half = engine.has_half_cells
-    contact = contact_points.make_contact(model, task.patch, engine.choice, has_half_cells=half)
+    contact = contact_points.make_contact(
+        model, task.patch, engine.choice, has_half_cells=engine.has_half_cells
+    )
     return contact, None
