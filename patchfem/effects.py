@@ -12,7 +12,7 @@ interface under a constant load. Optional features are:
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
 - `harmonic`: steady motions over one period;
-- `march`: time steps with return maps (`points.return_maps_kernels`).
+- `march`: time steps with return maps (`time_steps.laws_kernels`).
 
 Traits of laws:
 
@@ -24,7 +24,7 @@ Traits of laws:
 - `creeps`: the interface never sticks;
 - `cells`: a continuous distribution of elements is discretised into cells.
 
-`runs.rig.joints` and `points.laws` have their own lists of supported laws.
+`runs.rig.joints` and `time_steps.laws` have their own lists of supported laws.
 
 A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
 `DRIVE_BUILDERS` of its module; the class `Waveform` describes its traits.
@@ -334,13 +334,15 @@ EFFECTS = {
         "random base-only endless",
         "patchfem.structure.noise",
     ),
-    "structure.stiffening": Effect("patchfem.points.contacts", "F = k_3 x^3 at the output"),
+    "structure.stiffening": Effect(
+        "patchfem.time_steps.springs_kernels", "F = k_3 x^3 at the output"
+    ),
     "accuracy.method=exact": Effect(
         "patchfem.hybrid.runs",
         "Runge-Kutta steps of order 8 that end where a law changes its regime, with a step error of 1e-12",
     ),
     "accuracy.method=march": Effect(
-        "patchfem.points.march_kernels",
+        "patchfem.time_steps.march_kernels",
         "exact motion of the modes; the force is averaged over the path of each step "
         "and found by Newton's method",
     ),

@@ -124,9 +124,9 @@ def test_exact_edited_law_is_compiled_again(tmp_path, shared_cache, parallel_res
     cache = shutil.copytree(shared_cache, tmp_path / "cache")
     first = parallel_results[0]
     assert first["numba"] and len(first["said"]) == 1 and "compiling" in first["said"][0]
-    law = package / "patchfem/points/return_maps_kernels.py"
+    law = package / "patchfem/time_steps/cells_kernels.py"
     text, count = re.subn(
-        r"PointState\((?=mu \* state, 0.5)", "PointState(0.8 * ", law.read_text("utf-8")
+        r"(?<=Value.END \+ j\] = )(?=friction \* cell)", "0.8 * ", law.read_text("utf-8")
     )
     assert count == 1
     law.write_text(text, "utf-8")

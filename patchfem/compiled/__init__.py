@@ -61,7 +61,6 @@ TUPLE_MODULES = (
     "hybrid/records.py",
     "points/case_rows.py",
     "points/law_rows.py",
-    "points/march_rows.py",
 )
 CACHE_FOLDER_PATTERN = re.compile(r"[0-9a-f]{16}")
 # Largest number of folders of compiled code, 0.5 MB to 20 MB each, besides the one in use. Every edit of a kernel, every
@@ -377,7 +376,7 @@ def load_compiled_module(module: str, report=None):
     Parameters
     ----------
     module : str
-        Name of the module without that of the package, such as "points.march_kernels".
+        Name of the module without that of the package, such as "time_steps.march_kernels".
     report : callable or None
         Callback that receives a message if numba compiles a function.
 

@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class Law(IntEnum):
-    """Number of a friction law or spring in row 0 of `numbers`.
+    """Number of a friction law in row 0 of `numbers`.
 
     - COULOMB: rigid friction
     - TANH: friction that follows the velocity, as its hyperbolic tangent
@@ -12,8 +12,6 @@ class Law(IntEnum):
     - MASING: parallel sliders, see `Masing`
     - BOUC_WEN, LUGRE: laws of these names
     - BONDS: bonds that are summed by their moments
-    - CUBIC, INTERLOCK: nonlinear springs
-    - LIST: bonds that are summed by a list of strips
     """
 
     COULOMB = 0
@@ -23,9 +21,6 @@ class Law(IntEnum):
     BOUC_WEN = 4
     LUGRE = 5
     BONDS = 6
-    CUBIC = 7
-    INTERLOCK = 8
-    LIST = 9
 
 
 class Masing(IntEnum):

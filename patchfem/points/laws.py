@@ -34,11 +34,6 @@ class PointLaw(NamedTuple):
     memory: np.ndarray
     load: float | np.ndarray
 
-    @property
-    def limits(self) -> np.ndarray:
-        """Friction limits [N] of points of a law whose first number is the coefficient of friction."""
-        return self.numbers[1] * self.load
-
 
 def _pack(law: Law, numbers, memory=(), load=1.0, n_memory: int = N_MEMORY) -> PointLaw:
     """Return a PointLaw whose other numbers and memory are 0.
@@ -70,17 +65,6 @@ def make_jenkins(static: float, length: float, load: float = 1.0) -> PointLaw:
         Normal load [N].
     """
     return _pack(Law.JENKINS, (static, np.maximum(length, MIN_LENGTH)), (0.0, load), load)
-
-
-def make_elements(stiffness, yield_slide) -> PointLaw:
-    """Return t parallel elastic-plastic elements, a point each.
-
-    Parameters
-    ----------
-    stiffness, yield_slide : (t,) array
-        Stiffnesses [N/m] and slides at which the elements yield [m].
-    """
-    return make_jenkins(np.multiply(stiffness, yield_slide), np.asarray(yield_slide, float))
 
 
 def make_coulomb(static: float, kinetic: float, load: float = 1.0) -> PointLaw:
@@ -119,11 +103,6 @@ def make_bonds(bonds: Bonds, load: float = 1.0) -> PointLaw:
     return _pack(Law.BONDS, numbers, (bonds.length, bonds.initial * load), load)
 
 
-def make_list(bonds: Bonds, load: float) -> PointLaw:
-    """Return a point under a load [N] whose bonds are kept in a list, over which the friction force is summed."""
-    return _pack(Law.LIST, (bonds.static, bonds.length), load=load)
-
-
 def make_sliders(limit, length, order, beta) -> PointLaw:
     """Return parallel sliders of Segalman's density (`friction.laws.iwan`) under a constant load.
 
@@ -139,16 +118,6 @@ def make_sliders(limit, length, order, beta) -> PointLaw:
     memory = (*(0.0,) * Masing.VIRGIN, 1.0)
     size = Masing.STACK + 2 * REVERSALS
     return _pack(Law.MASING, (limit, length, order, beta), memory, n_memory=size)
-
-
-def make_cubic(stiffness: float) -> PointLaw:
-    """Return a spring of force stiffness q^3."""
-    return _pack(Law.CUBIC, (stiffness,))
-
-
-def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
-    """Return a spring whose force is sinusoidal, of stiffness [N/m] at rest."""
-    return _pack(Law.INTERLOCK, (stiffness, wavelength))
 
 
 def make_point_law(name: str, law, load) -> PointLaw:

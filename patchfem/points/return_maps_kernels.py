@@ -2,33 +2,30 @@
 
 Over a step a point slides by dq. Its law is replaced by the mean of the force along the straight path dq, so that
 mean force times dq is exactly the work of the law (a discrete gradient). Laws of the velocity use the mean of the
-forces at both ends, weighted so that a stiff law is damped (exponential fitting). A law is a branch of five functions:
+forces at both ends, weighted so that a stiff law is damped (exponential fitting). A law is a branch of four functions:
 
 - `mean_force`: path-mean force and its derivatives by the increment and by the velocity at the end
 - `advance`: memory after the step
 - `read`: force, stored energy and elastic stretch of a state
-- `press`: memory after a change of the load at rest
 - `prepare`: memory for the middle of a step, from the velocity at its start
 
-Columns of `numbers` and `memory` belong to points; their rows depend on the law:
+COULOMB and JENKINS are solved in closed form (`linear_cases_kernels`) and have no branch. Columns of `numbers` and `memory`
+belong to points; their rows depend on the law:
 
 ============= ==================================================== =================================================
 law           numbers from row 1 on, per unit of load              memory
 ============= ==================================================== =================================================
 COULOMB       mu_s, mu_k                                           direction of slip, 0 during stick
 TANH          mu, v_0 [m/s]                                        force
-JENKINS       mu, length [m]                                       force/mu, springs (load at which they yield)
+JENKINS       mu, length [m]                                       force/mu, load [N]
 MASING        F_S, phi_max [m], chi + 1, beta                      see `Masing`
 BOUC_WEN      mu, length [m], exponent n, shape s                  z
 LUGRE         mu_s, mu_k, stiffness, v_s, sigma_1, sigma_2         stretch [m], force
 BONDS         mu, eps_0 [m], growth (5) (eq. 2.10), m_0            eps, m, z, s2, eps in the middle of the step
-CUBIC         k_3 [N/m3]                                           slide [m]
-INTERLOCK     k [N/m], wavelength [m]                              slide [m]
-LIST          mu, length [m]                                       see `lists_kernels`
 ============= ==================================================== =================================================
 """
 
-from math import exp, sin, sqrt, tanh
+from math import exp, sqrt, tanh
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +36,6 @@ from ..friction.bonds.point_kernels import (
     bond_mean,
     bond_step,
     grow,
-    press_point,
     shape_functions,
 )
 from ..friction.laws.bouc_wen_kernels import follow_path
@@ -104,7 +100,7 @@ class Relaxed(NamedTuple):
 
 @njit(**NJIT_CALL)
 def mean_force(numbers, memory, j, load, step):
-    """Return the `MeanForce` of point j under a load over a `Step`; a COULOMB point has to slip.
+    """Return the `MeanForce` of point j under a load over a `Step`.
 
     Parameters
     ----------
@@ -121,19 +117,12 @@ def mean_force(numbers, memory, j, load, step):
     """
     law = numbers[0, j]
     dq = step.increment
-    if law == Law.JENKINS:
-        moved = _stretch(memory[0, j], memory[1, j] / numbers[2, j] * dq, load)
-        slope = 0.5 * memory[1, j] / numbers[2, j] * moved.end * moved.end
-        return _end_path(numbers[1, j] * moved.mean, numbers[1, j] * slope, dq)
     if law == Law.BONDS:
         eps = memory[4, j]
         shapes = shape_functions(abs(dq) / eps)
         mean, slope = bond_mean(memory[1, j], memory[2, j], dq, load, eps, shapes)
         stiffness = numbers[1, j] / numbers[2, j]
         return _end_path(stiffness * mean, stiffness * slope, dq)
-    if law == Law.COULOMB:
-        force = memory[0, j] * numbers[2, j] * load
-        return MeanForce(force, 0.0, 0.0, force, 0.0)
     if law == Law.TANH:
         return _mean_tanh(numbers[1, j] * load, numbers[2, j], step)
     if law == Law.LUGRE:
@@ -147,9 +136,6 @@ def mean_force(numbers, memory, j, load, step):
         slope = (mean_lugre(numbers, memory[0, j], j, load, other).mean - force) / change
         elastic = load * numbers[3, j] * (relaxed.end - memory[0, j])
         return MeanForce(force, slope, 0.0, last, elastic)
-    if law == Law.CUBIC or law == Law.INTERLOCK:
-        force, slope = _mean_spring(numbers, memory[0, j], j, dq)
-        return _end_path(force, slope, dq)
 
     # Rate-independent laws: d(mean)/d(dq) = (force at the end - mean)/dq.
     if law == Law.MASING:
@@ -172,21 +158,6 @@ def _end_path(force, slope, dq):
     `force` [N] is the mean force over the increment `dq` [m], and `slope` [N/m] its derivative by the increment.
     """
     return MeanForce(force, slope, 0.0, force + slope * dq, 0.0)
-
-
-@njit(**NJIT_KERNEL)
-def _stretch(start, move, limit):
-    """Stretch a spring, which slips at +-`limit`, by an increment `move`.
-
-    `start` is the stretch before the increment, and all arguments have the same unit. The result is a `Relaxed` with the
-    elastic fraction of the increment in place of the end.
-    """
-    free = start + move
-    end = min(max(free, -limit), limit)
-    if abs(move) < 1e-290:
-        return Relaxed(1.0, start)
-    elastic = 1 - (free - end) / move
-    return Relaxed(elastic, elastic * (start + end) * 0.5 + (1 - elastic) * end)
 
 
 @njit(**NJIT_CALL)
@@ -295,27 +266,6 @@ def lugre_force(numbers, j, load, stretch, velocity):
         Stretch [m] and velocity [m/s].
     """
     return load * find_force(numbers[:, j], stretch, velocity)
-
-
-@njit(**NJIT_CALL)
-def _mean_spring(numbers, slide, j, dq):
-    """Return the mean force [N] over dq and its slope [N/m] of a cubic or interlocking spring.
-
-    `numbers` (k, m) are those of the laws of m points, of which point `j` is the spring. `slide` [m] is the start of the
-    increment `dq` [m].
-    """
-    end = slide + dq
-    if numbers[0, j] == Law.CUBIC:
-        k = 0.25 * numbers[1, j]
-        force = k * (slide + end) * (slide * slide + end * end)
-        return force, k * (slide * slide + 2 * slide * end + 3 * end * end)
-    turn = 6.283185307179586 / numbers[2, j]
-    half = 0.5 * turn * dq
-    ratio = sin(half) / half if abs(half) > SMALL_RATE else 1 - half * half / 6
-    force = numbers[1, j] / turn * sin(turn * slide + half) * ratio
-    if abs(half) < SMALL_RATE:
-        return force, 0.5 * numbers[1, j]
-    return force, (numbers[1, j] / turn * sin(turn * end) - force) / dq
 
 
 @njit(**NJIT_KERNEL)
@@ -517,17 +467,7 @@ def advance(numbers, memory, j, load, step):
     law = numbers[0, j]
     dq = step.increment
 
-    if law == Law.JENKINS:
-        start = memory[0, j]
-        springs = memory[1, j]
-        move = springs / numbers[2, j] * dq
-        memory[0, j] = min(max(start + move, -load), load)
-        if springs > load and move != 0:
-            # Springs beyond those of the load break as the point slips.
-            slipped = 1 - (memory[0, j] - start) / move
-            memory[1, j] = load + (springs - load) * exp(-slipped * abs(dq) / numbers[2, j])
-
-    elif law == Law.BONDS:
+    if law == Law.BONDS:
         # Moments of the bonds after the increment; growing bonds then get their new length (eq. 2.10).
         eps = memory[4, j]
         bonds = memory[1, j], memory[2, j], memory[3, j]
@@ -547,18 +487,15 @@ def advance(numbers, memory, j, load, step):
         memory[1, j] = lugre_force(numbers, j, load, memory[0, j], step.end_velocity)
     elif law == Law.MASING:
         _walk(numbers, memory, j, dq, True)
-    elif law == Law.BOUC_WEN:
+    else:
         memory[0, j] = _walk_bouc_wen(numbers, memory[0, j], j, 1.0, dq).end / numbers[1, j]
-    elif law != Law.COULOMB:
-        memory[0, j] += dq
 
 
 @njit(**NJIT_CALL)
 def read(numbers, memory, j, load):
     """Return the force, stored energy and mean stretch of point j under a load.
 
-    The table at the top of the module lists the rows of `numbers` and `memory` for each law. A COULOMB point that sticks has
-    no force of its own.
+    The table at the top of the module lists the rows of `numbers` and `memory` for each law.
 
     Parameters
     ----------
@@ -575,20 +512,12 @@ def read(numbers, memory, j, load):
     mu = numbers[1, j]
     state = memory[0, j]
 
-    # Springs and bonds: force, stored energy and mean stretch.
-    if law == Law.JENKINS:
-        if memory[1, j] <= 0:
-            return PointState(0.0, 0.0, 0.0)
-        stretch = numbers[2, j] * state / memory[1, j]
-        return PointState(mu * state, 0.5 * mu * state * stretch, stretch)
     if law == Law.BONDS:
         m = memory[1, j]
         stretch = memory[2, j] / m if m > 0 else 0.0
         stiffness = mu / numbers[2, j]
         return PointState(stiffness * memory[2, j], 0.5 * stiffness * memory[3, j], stretch)
 
-    if law == Law.COULOMB:
-        return PointState(state * numbers[2, j] * load, 0.0, 0.0)
     if law == Law.TANH:
         return PointState(state, 0.0, 0.0)
 
@@ -600,93 +529,4 @@ def read(numbers, memory, j, load):
         stretch = numbers[2, j] * state
         return PointState(mu * load * state, 0.5 * mu * load * state * stretch, stretch)
 
-    if law == Law.LUGRE:
-        return PointState(memory[1, j], 0.5 * numbers[3, j] * load * state * state, state)
-    if law == Law.CUBIC:
-        return PointState(mu * state**3, 0.25 * mu * state**4, 0.0)
-
-    # Interlocking: F = k/w sin(w q) with the wave number w, and the energy that belongs to it.
-    turn = 6.283185307179586 / numbers[2, j]
-    sine = sin(0.5 * turn * state)
-    return PointState(mu / turn * sin(turn * state), 2 * mu * sine * sine / (turn * turn), 0.0)
-
-
-@njit(**NJIT_CALL)
-def slip_share(numbers, memory, j, load, velocity):
-    """Return the fraction of the motion of point j that is irreversible at this instant, d(slide - stretch)/d(slide).
-
-    Parameters
-    ----------
-    numbers : (k, m) array
-        Numbers of the laws of m points. Row 0 is the `Law`.
-    memory : (l, m) array
-        Memory of the laws of m points, a column for each.
-    j : int
-        Number of the point.
-    load : float
-        Normal load [N].
-    velocity : float
-        Velocity [m/s]. Its sign is the direction of the motion.
-    """
-    law = numbers[0, j]
-    state = memory[0, j]
-    direction = 1.0 if velocity > 0 else -1.0
-    if law == Law.COULOMB:
-        return abs(state)
-    if law == Law.JENKINS:
-        return 1.0 if direction * state >= load else 0.0
-
-    # Stretch z/m of bonds relative to m eps/load, and that of the LuGre law, relative to their stretches in steady slip
-    if law == Law.BONDS:
-        m = memory[1, j]
-        return direction * memory[2, j] * load / (m * m * state)
-    if law == Law.LUGRE:
-        return direction * state / relaxation_length(numbers[:, j], velocity)
-    if law == Law.BOUC_WEN:
-        share = abs(state) ** numbers[3, j]
-        return share if direction * state > 0 else (1 - 2 * numbers[4, j]) * share
-
-    # The sliders that slip carry B - x B' of the limit, see `_first_loading`. None of them does after a reversal.
-    if law == Law.MASING:
-        if direction * memory[Masing.DIRECTION, j] < 0:
-            return 0.0
-        n = int(memory[Masing.COUNT, j])
-        start = memory[Masing.STACK + 2 * n - 2, j] if n > 0 else 0.0
-        half = 0.5 if n > 0 else 1.0
-        ratio = half * abs(memory[Masing.SLIDE, j] - start) / numbers[2, j]
-        if ratio < 1 and (n > 0 or memory[Masing.VIRGIN, j] > 0):
-            order = numbers[3, j]
-            return ratio ** (order + 1) * order / (numbers[4, j] * (order + 1) + order)
-    return 1.0
-
-
-@njit(**NJIT_CALL)
-def press(numbers, memory, j, before, after):
-    """Change the load of point j at rest: elastic forces are cut at the new limit, new bonds form.
-
-    Parameters
-    ----------
-    numbers : (k, m) array
-        Numbers of the laws of m points; row 0 is the `Law`.
-    memory : (l, m) array
-        Memory of the laws of m points, a column for each.
-    j : int
-        Number of the point.
-    before : float
-        Load before the change [N].
-    after : float
-        Load after the change [N].
-    """
-    law = numbers[0, j]
-    if before == after:
-        return
-    if law == Law.JENKINS:
-        memory[0, j] = min(max(memory[0, j], -after), after)
-        memory[1, j] = max(memory[1, j], after) if after > 0 else 0.0
-    elif law == Law.BONDS:
-        bonds = memory[1, j], memory[2, j], memory[3, j]
-        memory[1, j], memory[2, j], memory[3, j] = press_point(
-            bonds, before, after, numbers[8, j], numbers[2, j]
-        )
-    elif law == Law.TANH:
-        memory[0, j] *= after / before if before > 0 else 0.0
+    return PointState(memory[1, j], 0.5 * numbers[3, j] * load * state * state, state)

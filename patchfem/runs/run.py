@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import points
+from .. import time_steps
 from ..core import Measure, Missing, NotConverged, Outcome
 from ..cost_model import measure_cpu_time
 from ..model.model import Model
@@ -305,8 +305,8 @@ class _Passes:
         is_missing = not self._count and model.wear is None and not march_state_path(1).is_file()
         if file.resume and is_missing:
             raise evolve.make_missing_state_error(file.path)
-        return points.checkpoint.store_checkpoints(
-            points.checkpoint.CheckpointFiles(
+        return time_steps.checkpoint.store_checkpoints(
+            time_steps.checkpoint.CheckpointFiles(
                 march_state_path, hash_run(model, patch, file.version), file.resume
             )
         )

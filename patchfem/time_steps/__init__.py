@@ -30,7 +30,8 @@ change of ENERGY.
 
 # Names that other folders use, by module
 PUBLIC = {
-    "contacts": ("Contact", "PointSet"),
+    "checkpoint": ("CheckpointFiles", "store_checkpoints"),
+    "contacts": ("BondSum", "Contact", "PointSet"),
     "laws": (
         "STIFF_LAWS",
         "PointLaw",
@@ -40,5 +41,7 @@ PUBLIC = {
         "make_interlocking",
         "make_point_law",
     ),
+    "slides": ("BLOCK", "follow"),
     "systems": ("find_stiffness",),
+    "time_march": ("March", "Motion", "Snapshot", "load_kernels", "march"),
 }

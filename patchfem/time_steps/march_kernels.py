@@ -22,16 +22,18 @@ which a slipping port would reverse, or a port at rest is released, is halved up
 step lets a held port move and come back. The work of this motion is taken from that of the drive, as friction at rest does
 none.
 
-`system` is a `march_rows.System` with `step_rows_kernels.Points`. A step of level k lasts a whole step over 2^k.
+`system` is a `march_rows_kernels.System` with `step_rows_kernels.Points`. A step of level k lasts a whole step over 2^k.
 """
 
 import numpy as np
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from ..points import flanks_kernels as flanks
-from ..points import normal_kernels as normal
-from ..points.march_rows import (
+from . import flanks_kernels as flanks
+from . import lists_kernels as lists
+from . import normal_kernels as normal
+from .laws_kernels import slide_points
+from .march_rows_kernels import (
     N_PORT_COLUMNS,
     RESIDUAL,
     Flank,
@@ -40,7 +42,7 @@ from ..points.march_rows import (
     Shear,
     Total,
 )
-from ..points.motion_kernels import (
+from .motion_kernels import (
     INCREMENT_ROUND_OFF,
     TINY_LOAD,
     advance_shear,
@@ -52,8 +54,6 @@ from ..points.motion_kernels import (
     store_base,
     subtract_step,
 )
-from . import lists_kernels as lists
-from .laws_kernels import slide_points
 from .step_rows_kernels import VECTOR, WIDTH, Law, Step, Value
 
 MAX_NEWTON_ITERATIONS = 60  # Newton iterations of a step
@@ -79,7 +79,7 @@ def slide_block(system, block, move, velocity, damping, step):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march; the block is changed.
     block : int
         Number of the block.
@@ -184,7 +184,7 @@ def write_forces(system, level, step):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
@@ -255,7 +255,7 @@ def slip_rigidly(system, p, block):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     p : int
         Number of the port.
@@ -360,7 +360,7 @@ def write_matrix(system, level, step):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
@@ -466,7 +466,7 @@ def write_balanced_forces(system, level, step):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
@@ -495,7 +495,7 @@ def solve_forces(system, level, step):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
@@ -568,7 +568,7 @@ def find_loads(system, row, fraction, is_solved):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     row : int
         Number of the whole step.
@@ -618,7 +618,7 @@ def find_event(system, level, drive):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
@@ -671,7 +671,7 @@ def release_port(system, drive, is_shortest):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     drive : float
         Drive at the end of the step [m s-2].
@@ -784,10 +784,10 @@ def add_work(system, sample, first_column, part):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     sample : (k,) array
-        Sample, in the rows of `march_rows.Sample`; output.
+        Sample, in the rows of `march_rows_kernels.Sample`; output.
     first_column : int
         Column of the mean force of the first port.
     part : float
@@ -814,7 +814,7 @@ def solve_step(system, level, row, end):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
@@ -902,7 +902,7 @@ def read_points(system, forces, stretch, loads):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march.
     forces, stretch, loads : (m,) array
         Output.
@@ -923,10 +923,10 @@ def write_ports(system, sample):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march.
     sample : (k,) array
-        Sample, in the rows of `march_rows.Sample`; output.
+        Sample, in the rows of `march_rows_kernels.Sample`; output.
     """
     ports = system.ports
     points = system.points

@@ -166,7 +166,7 @@ class Points(NamedTuple):
       times the pressure of the lower piece at the place of the point
     - share, place (b, WIDTH): fraction of the resultant or factor of the pressure [N]; position at rest [m]
     - shapes (r, b WIDTH), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
-    - shear (8, r): see `march_rows.Shear`
+    - shear (8, r): see `march_rows_kernels.Shear`
     - is_spring (p,): whether the points of a port are springs, whose work is not friction
     - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
     - nodal (n,): forces of the nodes of a patch [N]

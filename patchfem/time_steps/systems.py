@@ -1,19 +1,107 @@
 """Arrays of a march of contact points, and the states that are read from it."""
 
-import numpy as np
+from typing import NamedTuple
 
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+
+from .. import compiled
+from ..contact.set_arrays import PRESENT_SLOT_INDEX, hash_set, make_set_arrays
 from ..core import ModalBasis
 from ..friction.bonds.list_numbers import make_lists, make_no_lists
-from ..points import time_march
-from ..points.march_rows import RESULTANT, Options, Port, Ports, Shear, Structure, System, Total
+from ..structure.exponentials import exponential
+from .contacts import Contact
+from .march_rows_kernels import (
+    RESULTANT,
+    Flank,
+    Options,
+    Port,
+    Ports,
+    Shear,
+    Structure,
+    System,
+    Total,
+)
 from .step_rows_kernels import N_VALUES, WIDTH, BondRow, Law, ListRow, Points, Value
 
+MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
+N_GAUSS = 8  # Gauss points of the integrals over that step
+REDUNDANT = 1e-10  # relative compliance of the strongest port at rest if ports outnumber the modes
+MIN_STRENGTH = 0.01  # smallest strength by which ports share a force, relative to the strongest
 # Lengths of the steps: whole ones, and those after up to seven halvings, by which a step that fails is retried
 N_LEVELS = 8
 MIN_RANK = (
     1e-6  # smallest singular value, relative to the largest one, of ports that modes move apart
 )
 N_EVENT_LEVELS = 20  # the same with rigid friction, whose stops and releases are located by halving
+
+
+class Responses(NamedTuple):
+    """Motion, viscous loss and work of the drive in steps of several lengths, in the rows of `march_rows_kernels.Structure`.
+
+    N = 3 n + 3 inputs: 2 n coordinates and velocities, the drive with two derivatives, and n constant modal forces over
+    mass.
+
+    - motion: (levels, 2 n, N) motion at the end of a step per input
+    - loss: (levels, N, N) viscous loss [J] as a quadratic form of the inputs
+    - work: (levels, 3, N) work of the drive [J] as a bilinear form of the drive and the inputs
+    """
+
+    motion: np.ndarray
+    loss: np.ndarray
+    work: np.ndarray
+
+
+def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
+    """Return motion and energies of steps of several lengths.
+
+    The matrix exponential is that of the modes with the chain of derivatives of the drive and with constant forces.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+        Modes of the rig.
+    step : float
+        Duration of a whole step [s].
+    levels : int
+        Number of lengths of steps.
+    """
+    # The state (3 n + 3,): coordinates, velocities, the acceleration of the base with two derivatives, and constant
+    # forces per mass.
+    n = modes.omega.size
+    matrix = np.zeros((3 * n + 3, 3 * n + 3))
+    velocities = slice(n, 2 * n)
+    matrix[:n, velocities] = np.eye(n)
+    matrix[velocities, :n] = -np.diag(modes.omega**2)
+    matrix[velocities, velocities] = -modes.damping_matrix
+    matrix[velocities, 2 * n] = -np.asarray(modes.base)
+    matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
+    matrix[velocities, 2 * n + 3 :] = np.eye(n)
+
+    # The first step resolves the fastest mode. As steps double, an integral of x(t)^T form x(t) is the sum of both halves.
+    fastest = float(modes.omega.max(initial=0.0)) * step
+    n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
+    short = step / 2**n_halvings
+    nodes, weights = leggauss(N_GAUSS)
+    # The units of these states are [m s^-power].
+    powers = np.concatenate([np.zeros(n), np.ones(n), [2, 3, 4], np.full(n, 2.0)])
+    loss = np.zeros_like(matrix)
+    loss[velocities, velocities] = modes.mass * modes.damping_matrix
+    work = np.zeros_like(matrix)
+    work[2 * n, velocities] = -modes.mass * np.asarray(modes.base)
+    inside = np.array([exponential(matrix, 0.5 * short * (1 + node), powers) for node in nodes])
+    forms = [
+        np.einsum("g,gki,kl,glj->ij", 0.5 * short * weights, inside, form, inside, optimize=True)
+        for form in (loss, work)
+    ]
+    parts = []
+    for k in range(n_halvings + 1):
+        # The square of the last matrix would double its round-off.
+        whole = exponential(matrix, short * 2**k, powers)
+        if k > n_halvings - levels:
+            parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
+        forms = [form + whole.T @ form @ whole for form in forms]
+    return Responses(*(np.array(part) for part in zip(*parts[::-1])))
 
 
 def make_system(
@@ -49,12 +137,12 @@ def make_system(
     is_rigid = [point_set.law.law == Law.COULOMB for point_set in contact.point_sets]
     has_events = modes is not None and any(is_rigid)
     levels = N_EVENT_LEVELS if has_events else N_LEVELS
-    responses = time_march.Responses(*(np.zeros((levels, k, 3)) for k in (0, 3, 3)))
+    responses = Responses(*(np.zeros((levels, k, 3)) for k in (0, 3, 3)))
     shape = np.zeros((3, 0))
     damping = np.zeros((0, 0))
     if modes is not None:
         mass = float(modes.mass)
-        responses = time_march.make_responses(modes, step, levels)
+        responses = make_responses(modes, step, levels)
         shape = np.array([modes.omega**2, modes.base, modes.output], float)
         damping = np.array(modes.damping_matrix, float)
     by_force = responses.motion[:, :, 2 * n + 3 :]
@@ -87,14 +175,13 @@ def make_system(
         int(has_events),
         int((points.law == Law.LIST).any()),
         int(contact.has_loads),
-        0,
     )
     state = np.zeros((3, 2 * n))
     if start is not None:
         state[0] = [*start.z, *start.v]
-    sets = time_march.make_no_sets() if contact.sets is None else contact.sets.make_arrays()
+    sets = make_no_sets() if contact.sets is None else contact.sets.make_arrays()
     lists = _make_lists(contact, points)
-    flank = time_march.make_flank(contact)
+    flank = make_flank(contact)
     totals = np.zeros(len(Total))
     system = System(structure, ports, points, lists, flank, sets, state, totals, options)
     _set_start(system, contact)
@@ -122,7 +209,7 @@ def _set_start(system: System, contact) -> None:
     points.memory[is_rigid, 0] = np.sign(velocities)[is_rigid]
     values[is_rigid, Value.START // WIDTH, 0] = (limits * points.memory[:, 0])[is_rigid]
     if contact.sets is not None:
-        time_march.press_first(system, contact)
+        press_first(system, contact)
     if contact.grooves is not None and n:
         _climb_first(system, contact)
     points.trial[:] = points.memory
@@ -130,7 +217,7 @@ def _set_start(system: System, contact) -> None:
 
 def _climb_first(system: System, contact) -> None:
     """Give the lifted mass the vertical velocity of the flank, and the points the normal force there."""
-    ratio = time_march.find_first_climb(system, contact)
+    ratio = find_first_climb(system, contact)
     points = system.points
     for row in (Value.START_LOAD, Value.END_LOAD):
         points.values[:, row : row + WIDTH] *= ratio
@@ -164,7 +251,7 @@ def _find_redundant(rows, contact) -> np.ndarray:
     strength = np.array([sets[p].law.limits.sum() * np.linalg.norm(rows[p]) for p in rigid])
     largest = strength.max()
     share = strength / largest if largest > 0 else np.ones(len(rigid))
-    redundant[rigid] = time_march.REDUNDANT / np.maximum(share, time_march.MIN_STRENGTH)
+    redundant[rigid] = REDUNDANT / np.maximum(share, MIN_STRENGTH)
     return redundant
 
 
@@ -201,9 +288,10 @@ def _make_points(contact, n_ports: int) -> Points:
     node = np.full((n_blocks, WIDTH), RESULTANT, np.int64)
     share = np.zeros((n_blocks, WIDTH))
     place = np.zeros((n_blocks, WIDTH))
+    n_moving = n_ports - len(sets)  # ports of heave and pitch have no points
     shears = [point_set.shear for point_set in sets]
     n_shear = [0 if shear is None else len(shear.stiffness) for shear in shears]
-    first_shear = np.cumsum([0, *n_shear, *[0] * (n_ports - len(sets))])
+    first_shear = np.cumsum([0, *n_shear, *[0] * n_moving])
     shapes = np.zeros((sum(n_shear), n_blocks * WIDTH))
     stiffness = np.zeros(sum(n_shear))
     scale = np.ones(sum(n_shear))
@@ -243,7 +331,7 @@ def _make_points(contact, n_ports: int) -> Points:
         np.repeat(np.arange(len(counts)), counts),
         np.concatenate([np.zeros(0, np.int64), *(part.count for part in blocks)]),
         _count_memory(sets, blocks),
-        np.cumsum([0, *counts, *[0] * (n_ports - len(sets))]),
+        np.cumsum([0, *counts, *[0] * n_moving]),
         first_shear,
         numbers,
         memory,
@@ -255,7 +343,7 @@ def _make_points(contact, n_ports: int) -> Points:
         shapes,
         stiffness,
         shear,
-        np.array([*(point_set.is_spring for point_set in sets), *[False] * (n_ports - len(sets))]),
+        np.array([point_set.is_spring for point_set in sets] + [False] * n_moving, bool),
         np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
         np.zeros(n_nodes),
         np.zeros(1),
@@ -285,3 +373,62 @@ def _count_memory(sets, blocks) -> np.ndarray:
         else:
             used.append(2 * sliders.weights.size * part.count)
     return np.concatenate(used)
+
+
+def make_flank(contact: Contact) -> np.ndarray:
+    """Return the numbers of the flank of the first port, (0,) without grooves."""
+    grooves = contact.grooves
+    if grooves is None:
+        return np.zeros(0)
+    flank = np.zeros(len(Flank))
+    flank[Flank.LOAD] = flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL] = contact.preload
+    flank[Flank.WAVE_NUMBER] = grooves.wave_number
+    flank[Flank.AMPLITUDE] = grooves.amplitude
+    flank[Flank.PHASE] = grooves.phase
+    flank[Flank.LIFTED_MASS] = grooves.lifted_mass
+    flank[Flank.NORMAL] = contact.preload * np.hypot(1.0, float(grooves.slope(0.0)))
+    flank[Flank.RATIO] = 1.0
+    return flank
+
+
+def make_no_sets():
+    """Return arrays of contact sets with a single point, for a march in which no pressure changes and none is used."""
+    point = np.zeros(1)
+    return make_set_arrays(
+        np.ones((1, 1)), point, point, (1.0, 0.0, 0.0, 1.0, 1.0), np.zeros(1, bool), n_slots=1
+    )
+
+
+def press_first(system: System, contact: Contact) -> None:
+    """Find the contact set of a patch at the start, and write its index to the counters of `system.sets`."""
+    press = compiled.load_compiled_module("contact.press_kernels")
+    name = hash_set(system.sets, contact.sets.in_contact)
+    n = system.state.shape[1] // 2
+    heave, pitch = (
+        float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch)
+    )
+    slot = press.find_set(system.sets, press.build_first_set(system.sets, name), -heave, pitch)
+    system.sets.counters[PRESENT_SLOT_INDEX] = slot
+
+
+def find_first_climb(system: System, contact: Contact) -> float:
+    """Set normal force and vertical velocity of the flank at the start; return the ratio of the force to that at rest."""
+    n = system.state.shape[1] // 2
+    row = system.ports.rows[0]
+    q = float(row @ system.state[0, :n])
+    slope = float(contact.grooves.slope(q))
+    flank = system.flank
+    normal = flank[Flank.LOAD] * np.hypot(1.0, slope)
+    ratio = normal / flank[Flank.NORMAL]
+    flank[Flank.NORMAL] = normal
+    flank[Flank.RISE_SPEED] = slope * float(row @ system.state[0, n:])
+    return ratio
+
+
+def copy_system(system):
+    """Return a copy of nested tuples of arrays, in which the arrays are copied too."""
+    if isinstance(system, np.ndarray):
+        return system.copy()
+    if isinstance(system, tuple):
+        return type(system)(*map(copy_system, system))
+    return system

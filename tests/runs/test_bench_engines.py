@@ -10,11 +10,11 @@ from friction_paths import reference_bond_lengths
 
 from patchfem import build
 from patchfem.friction import steady_loop
-from patchfem.points.slides import BLOCK
 from patchfem.runs.bench import bench
 from patchfem.runs.bench.slides import find_rest_ends
 from patchfem.runs.run import run
 from patchfem.scene import loads
+from patchfem.time_steps.slides import BLOCK
 
 POINT = '[normal]\nload = "100 N"\n'
 FRICTION = "[friction]\nstatic = 0.3\n"

@@ -12,7 +12,7 @@ from scene_texts import COATED, COULOMB, DRIVE, MODE, POINT, SLIDE
 
 from patchfem import SceneError
 from patchfem.effects import LAWS
-from patchfem.points import time_march
+from patchfem.time_steps import time_march
 
 KEYS = {
     "reference_speed": "1 mm/s",

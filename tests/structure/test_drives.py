@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
+from march_contacts import make_contact
 from modal_bases import make_modal_basis
 from scene_texts import MODE, PLASTIC, POINT
 from scipy.integrate import quad
 
 from patchfem import SceneError, plan, run
 from patchfem.core import Outcome, SineDrive
-from patchfem.points.contacts import make_contact
-from patchfem.points.time_march import march
 from patchfem.scene import loads
 from patchfem.structure.drives import SweepDrive, make_levels, make_step
 from patchfem.structure.tones import make_tones
+from patchfem.time_steps.time_march import march
 
 OMEGA = 2 * np.pi * 143
 

@@ -7,12 +7,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from march_contacts import make_bond_contact, make_pressed_contact
 from scipy.special import gamma
 
 from patchfem.friction import Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
-from patchfem.points.contacts import BondSum, Contact, make_bond_contact, make_pressed_contact
-from patchfem.points.slides import follow
+from patchfem.time_steps.contacts import BondSum, Contact
+from patchfem.time_steps.slides import follow
 
 GAUSS = np.polynomial.legendre.leggauss(12)
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from patchfem.points.slides import follow
+from patchfem.time_steps.slides import follow
 
 OMEGA = 2 * np.pi * 143
 

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from march_contacts import make_pressed_contact
 from pressed import solve_forces
 from scipy.optimize import brentq
 
@@ -12,8 +13,7 @@ from patchfem.contact import ContactSets
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.friction import Bonds
 from patchfem.motion_measures import energy_balance
-from patchfem.points.contacts import make_pressed_contact
-from patchfem.points.time_march import march
+from patchfem.time_steps.time_march import march
 
 MASS, LOAD, STILL = 0.884, 116.0, SineDrive(0.0, 2 * np.pi * 143)
 LAWS = {

@@ -14,12 +14,12 @@ from patchfem import load
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds, Grooves
 from patchfem.motion_measures import energy_balance
-from patchfem.points.time_march import march
 from patchfem.runs.bench import contact_points
 from patchfem.scene.keys.tables import Friction
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.time_steps import laws
 from patchfem.time_steps.contacts import Contact, PointSet
+from patchfem.time_steps.time_march import march
 
 LOAD, MU = 115.65, 0.4
 BASIS = make_modal_basis(2 * np.pi * 143, 0.003, mass=1.194)

@@ -13,9 +13,8 @@ from patchfem.friction.laws.iwan import Iwan
 from patchfem.friction.laws.lugre import LuGre
 from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.motion_measures import energy_balance
-from patchfem.points import follow, march
 from patchfem.slip import shear_modes
-from patchfem.time_steps import laws
+from patchfem.time_steps import follow, laws, march
 from patchfem.time_steps.contacts import Contact, PointSet
 
 LOADS = np.array([3.0, 8.0, 14.0, 12.0, 7.0, 2.0])  # N

@@ -108,9 +108,9 @@ def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndar
     ----------
     patch : Patch
         The pressed patch.
-    contact : points.contacts.Contact
+    contact : time_steps.contacts.Contact
         Points at all nodes, or at those of its shear modes.
-    snapshots : sequence of points.time_march.Snapshot
+    snapshots : sequence of time_steps.time_march.Snapshot
         States of the points in the f frames.
     """
     reduction = contact.reduction

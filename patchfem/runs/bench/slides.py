@@ -2,8 +2,9 @@
 
 In: a `SlideTask`. Out: `SlideHistories`. The force of a law without memory is a fraction of the friction limit, which
 depends only on the direction or the speed of the motion. Parallel elements under a constant load obey Masing's rules. All
-other laws are contact points that follow the path. Pieces that are rigid in shear give all points the same displacement;
-under a pressure that moves with the upper piece, one point under the whole load then has the resultant force.
+other laws are contact points that follow the path (`time_steps.slides`). Pieces that are rigid in shear give all points the
+same displacement; under a pressure that moves with the upper piece, one point under the whole load then has the resultant
+force.
 """
 
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import masing_loop
 from ...friction.record import make_law
-from ...points import slides
+from ...time_steps import slides
 from ..patch import jenkins_elements
 from . import averaged_law, contact_points, masing, shear
 from .engine import (

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ... import points
 from ...contact import contact_sets
 from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega
@@ -42,16 +41,14 @@ def make_contact(model: Model, numerics, patch):
     rig = model.rig
     rows = rig.modes.interfaces
     bond_sum = None
-    makers = laws
     if bond_lists.has_bond_list(model, numerics):
         bond_sum = make_bond_sum(model, bond_lists.choose_bond_summation(model, numerics))
-        makers = points.laws
     springs = []
     if rig.springs.interlock is not None:
-        law = makers.make_interlocking(*rig.springs.interlock)
+        law = laws.make_interlocking(*rig.springs.interlock)
         springs.append(PointSet(law, rows[0], is_spring=True))
     if rig.springs.cubic is not None:
-        law = makers.make_cubic(rig.springs.cubic)
+        law = laws.make_cubic(rig.springs.cubic)
         springs.append(PointSet(law, rig.modes.output, is_spring=True))
 
     fields = {}

@@ -11,10 +11,10 @@ import numpy as np
 
 from ...core import Outcome
 from ...effects import law_has_trait
-from ...points import time_march as engine
 from ...response.loops import CycleLoop
 from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
+from ...time_steps import time_march as engine
 from ..bench.engine import BondListGuard
 from . import bands
 from .bond_lists import choose_bond_summation, has_bond_list
@@ -71,7 +71,7 @@ class MarchEvaluator(RunEvaluator):
             Acceleration of the base, or force over the modal mass.
         cycles : float
             Number of cycles of the drive.
-        before : points.time_march.Motion or None
+        before : time_steps.time_march.Motion or None
             Run from whose end the motion goes on, or None for the start of the rig.
         frames : int
             Number of snapshots of the interface in the last cycle.
@@ -118,7 +118,7 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run : points.time_march.Motion
+        run : time_steps.time_march.Motion
             Motion in time steps.
         drive
             Drive of the run.
@@ -132,7 +132,7 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run : points.time_march.Motion
+        run : time_steps.time_march.Motion
             Motion in time steps.
         drive
             Drive of this motion, which may be a single level.
@@ -164,7 +164,7 @@ class MarchEvaluator(RunEvaluator):
 
         Parameters
         ----------
-        run : points.time_march.Motion
+        run : time_steps.time_march.Motion
             Motion in time steps, with the friction force and work of its window.
         drive
             Drive of this motion.

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...model.patch import PatchPiece
-from ...points.checkpoint import RETRY_ADVICE, read_state, write_state
+from ...time_steps.checkpoint import RETRY_ADVICE, read_state, write_state
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
 from ..patch import area

@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 from friction_paths import LowerPressure, march_bonds, upper_pressure
+from march_contacts import make_bond_contact
 from modal_bases import make_modal_basis
 from scipy.special import gammainc
 from vibration_forms import sliding_amplitude
@@ -18,10 +19,9 @@ from patchfem.core import SineDrive
 from patchfem.friction import Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
 from patchfem.motion_measures import energy_balance
-from patchfem.points.contacts import make_bond_contact
-from patchfem.points.time_march import march
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
+from patchfem.time_steps.time_march import march
 
 UNIT_PRESSURE = upper_pressure([1.0])
 OMEGA = 2 * np.pi * 143

@@ -8,8 +8,9 @@ from friction_forms import jenkins_loop
 from friction_paths import march_path, march_under_loads, triangle_path
 from hypothesis import given
 from hypothesis import strategies as st
+from march_contacts import make_contact
 
-from patchfem.points import laws, make_contact
+from patchfem.time_steps import laws
 
 PRESSURE = st.just(0.0) | st.floats(1e-6, 4)
 ROWS = st.lists(st.tuples(st.floats(-3, 3), PRESSURE), min_size=1, max_size=40)
@@ -21,7 +22,7 @@ UNIT_LAW = SimpleNamespace(law="elastic-plastic", static=1.0, bond_length=1.0)
 def test_exact_elastic_plastic_loop_agrees_with_closed_form(amplitude, length, per_stroke):
     """The loop area 4 mu N (A - eps) and the reversal force are exact for any number of steps per stroke."""
     path = triangle_path(amplitude, 2, per_stroke)
-    run = march_path(make_contact([laws.make_jenkins(0.3, length, 0.5)], [np.zeros(0)]), path)
+    run = march_path(make_contact([laws.make_cells(0.3, length, 0.5)], [np.zeros(0)]), path)
     cycle = slice(-2 * per_stroke, None)
     work = run.mean[cycle] @ np.diff(path)[cycle]
     area, end = jenkins_loop(amplitude, length, 0.3)

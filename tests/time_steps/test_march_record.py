@@ -2,25 +2,23 @@
 
 import numpy as np
 import pytest
+from march_contacts import (
+    make_bond_contact,
+    make_contact,
+    make_coulomb,
+    make_pressed_contact,
+    make_tanh,
+)
 from march_paths import OMEGA
 from modal_bases import make_modal_basis
 from varying_load_cases import LAWS, MIXED, crowned_contact, make_modes
 
 from patchfem.core import Outcome, SineDrive
 from patchfem.friction import Bonds
-from patchfem.friction.bonds.point_kernels import MAX_SERIES_PATH
-from patchfem.points import (
-    March,
-    laws,
-    make_bond_contact,
-    make_contact,
-    make_pressed_contact,
-    march,
-)
-from patchfem.points import time_march as engine
-from patchfem.points.march_rows import Point
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.structure import drive_sizes
+from patchfem.time_steps import March, laws, march
+from patchfem.time_steps import time_march as engine
 
 from .test_march_loads import reduce_to_shear_modes
 
@@ -34,7 +32,7 @@ STEPS = 80
 
 def make_tanh_contact(rows=ROW[None]):
     """Return the contact of 20 N tanh(v/(5 mm/s))."""
-    return make_contact([laws.make_tanh(20.0, 5e-3)], rows)
+    return make_contact([make_tanh(20.0, 5e-3)], rows)
 
 
 def make_compliance(count, scale=1.0):
@@ -68,7 +66,7 @@ def make_pitching_contact(basis):
 
 CASES = {
     "tanh": lambda: (BASIS, make_tanh_contact()),
-    "coulomb": lambda: (BASIS, make_contact([laws.make_coulomb(20.0, 16.0)], ROW[None])),
+    "coulomb": lambda: (BASIS, make_contact([make_coulomb(20.0, 16.0)], ROW[None])),
     "elements": lambda: (
         BASIS,
         make_contact([laws.make_elements([2e7, 1e7, 4e6], [3e-7, 1e-6, 2e-6])], [ROW]),
@@ -154,26 +152,6 @@ def test_exact_copy_of_march_goes_on_like_the_original():
     first = run.advance(200)
     second = copy.advance(200)
     assert np.abs(first - second).max() <= 1e-13 * np.abs(first).max() and np.ptp(first[:, 0]) > 0
-
-
-def test_exact_loops_over_bonds_equal_those_over_points_of_any_law():
-    """A march of bonds alone, in loops without branches, equals one that asks every point for its law.
-
-    The first steps are short for the bonds, and the last ones are longer than the series of their shape functions.
-    """
-    march = March(BASIS, DRIVE, make_compliant_contact(), STEPS)
-    other = march.fork()
-    assert march.system.options.has_only_bonds == 1
-    options = other.system.options._replace(has_only_bonds=0)
-    other.system = other.system._replace(options=options)
-    count = 10 * STEPS + STEPS // 4  # ends near the largest velocity
-    samples = march.advance(count)
-    slides = np.abs(march.system.points.values[Point.SLIDE])
-    assert np.abs(samples[1, 0]) < 1e-7
-    assert slides.max() > MAX_SERIES_PATH * 1e-6
-    scale = np.abs(samples).max(axis=0)
-    differences = np.abs(other.advance(count) - samples)
-    assert (differences <= 1e-10 * scale).all()
 
 
 def test_exact_parts_of_a_march_do_not_matter(monkeypatch):

@@ -6,14 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .contacts import Contact
-from .march_rows import N_PORT_COLUMNS, Sample, Total
-from .time_march import (
-    Snapshot,
-    load_kernels,
-    make_snapshot,
-    make_system,
-    split_losses,
-)
+from .march_rows_kernels import N_PORT_COLUMNS, Sample, Total
+from .systems import make_system
+from .time_march import Snapshot, load_kernels, make_snapshot, split_losses
 
 BLOCK = 4096  # samples between two reports of the progress
 SAME_STEP = 1e-6  # relative change of the duration of a step below which steps are equal

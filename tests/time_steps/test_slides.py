@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from march_contacts import make_bond_contact
 
 from patchfem.friction import Bonds
-from patchfem.points import contacts, slides
+from patchfem.time_steps import slides
 
 TIME = np.linspace(0.0, 0.4, 161)
 SLIDE = 3e-6 * np.sin(2 * np.pi * 10 * TIME) + 1e-6 * np.sin(2 * np.pi * 25 * TIME)
@@ -16,7 +17,7 @@ GROWING = Bonds(0.3, 1e-6, ratio=0.6, rest_growth=1e-5, slip_growth=2e-6, rest_s
 @pytest.mark.parametrize("bonds", [Bonds(0.3, 1e-6), GROWING])
 def test_exact_constant_load_equals_a_load_that_does_not_change(bonds):
     """A single point under a constant load has the forces, slips and losses of one whose varying load stays the same."""
-    one = contacts.make_bond_contact(bonds, 20.0, np.zeros(0))
+    one = make_bond_contact(bonds, 20.0, np.zeros(0))
     same = replace(one, load=lambda time: np.full(np.shape(time), 20.0), preload=20.0)
     plain, marched = (slides.follow(contact, TIME, SLIDE) for contact in (one, same))
     for name in ("force", "slip", "mean", "stored", "losses"):

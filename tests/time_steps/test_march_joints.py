@@ -5,20 +5,21 @@ import problems
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from march_contacts import (
+    make_contact,
+    make_coulomb,
+    make_cubic_spring,
+    make_interlocking_spring,
+    make_tanh,
+)
 from modal_bases import make_modal_basis
 from scipy.special import ellipk
 
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.friction import Bonds
 from patchfem.motion_measures import energy_balance
-from patchfem.points import (
-    laws,
-    make_contact,
-    make_cubic_spring,
-    make_interlocking_spring,
-    march,
-)
 from patchfem.structure import make_release
+from patchfem.time_steps import laws, march
 
 EVENT_ERROR = 1e-6  # an event is located within 1/2048 of a step
 
@@ -93,10 +94,10 @@ def march_random_chain(seed):
     kinds = [rng.choice(["coulomb", "ep", "bonds", "tanh"]) for _ in range(n)]
     kinetic = limit * rng.choice([0.3, 1.0], n)
     makers = {
-        "coulomb": lambda p: laws.make_coulomb(limit[p], kinetic[p]),
-        "ep": lambda p: laws.make_jenkins(limit[p], length[p]),
+        "coulomb": lambda p: make_coulomb(limit[p], kinetic[p]),
+        "ep": lambda p: laws.make_cells(limit[p], length[p], 1.0),
         "bonds": lambda p: laws.make_bonds(Bonds(0.5, length[p]), 2 * limit[p]),
-        "tanh": lambda p: laws.make_tanh(limit[p], length[p]),
+        "tanh": lambda p: make_tanh(limit[p], length[p]),
     }
     point_laws = [makers[kind](p) for p, kind in enumerate(kinds)]
     springs = [
@@ -137,7 +138,7 @@ def find_errors(modes, drive, static, kinetic, cycles):
     reference = problems.run_motion(
         modes, drive, [problems.make_coulomb(*pair) for pair in pairs], cycles, window=cycles
     )
-    point_laws = [laws.make_coulomb(sticks, slides) for sticks, slides in pairs]
+    point_laws = [make_coulomb(sticks, slides) for sticks, slides in pairs]
     contact = make_contact(point_laws, modes.interfaces)
     errors = []
     for count in (400, 1600, 6400):

@@ -31,7 +31,7 @@ def find_holds(system, state, drive):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march; `ports.vector` has the forces of the points of each port.
     state : (2 n,) array
         Modal coordinates and velocities.

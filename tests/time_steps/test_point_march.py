@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from march_contacts import make_coulomb
 
 from patchfem import compiled
 from patchfem.core import ModalBasis, SineDrive
-from patchfem.points import March, laws, march
-from patchfem.points.contacts import Contact, PointSet
+from patchfem.time_steps import March, march
+from patchfem.time_steps.contacts import Contact, PointSet
 
 OMEGA = 2 * np.pi * 143.0
 LIMIT = 40.0
@@ -34,7 +35,7 @@ def amplitude(motion) -> float:
 
 def test_coulomb_block_at_resonance():
     """The amplitude of the two-stop motion, and its energy balance."""
-    motion = run(laws.make_coulomb(1.0, 1.0, LIMIT), 200)
+    motion = run(make_coulomb(1.0, 1.0, LIMIT), 200)
     assert amplitude(motion) == pytest.approx(EXACT_AMPLITUDE, rel=1e-6)
     ledger = motion.ledger
     gap = ledger["work_in"] - ledger["viscous"] - ledger["booked"] - ledger["stored"]
@@ -43,7 +44,7 @@ def test_coulomb_block_at_resonance():
 
 def test_exact_rig_without_friction_shares_compiled_code():
     """The arrays of a march without points have the types of those with points: other types are compiled anew."""
-    point = PointSet(laws.make_coulomb(1.0, 1.0, LIMIT), np.ones(1))
+    point = PointSet(make_coulomb(1.0, 1.0, LIMIT), np.ones(1))
     contacts = Contact([]), Contact([point], LIMIT)
     systems = [March(make_modes(), DRIVE, contact, 10).system for contact in contacts]
     converter = compiled.machine.ArgumentConverter()

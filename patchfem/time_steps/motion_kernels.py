@@ -1,7 +1,6 @@
 """Motion of modes and ports in a step, whatever the laws of the points (compiled).
 
-Both marches (`points.march_kernels`, `time_steps.march_kernels`) use these functions. `system` is a `march_rows.System`; a
-step of level k lasts a whole step over 2^k.
+`system` is a `march_rows_kernels.System`; a step of level k lasts a whole step over 2^k.
 """
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
 from . import flanks_kernels as flanks
-from .march_rows import LOWER, RESIDUAL, Flank, Port, Shear, Total
+from .march_rows_kernels import LOWER, RESIDUAL, Flank, Port, Shear, Total
 
 INCREMENT_ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
 # Weight of the residuals of normal contact, which loses no energy, so that they would add up over the steps
@@ -93,7 +92,7 @@ def move_freely(system, level, drive, row, fraction):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
@@ -180,7 +179,7 @@ def add_energies(system, level):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
@@ -302,7 +301,7 @@ def find_resultant(system, row, fraction, is_solved):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march; the normal force of the flank is changed.
     row : int
         Number of the whole step.
@@ -353,7 +352,7 @@ def solve_holds(system, state, drive):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     state : (2 n,) array
         Modal coordinates and velocities.

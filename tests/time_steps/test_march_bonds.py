@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from march_contacts import make_bond_contact
 from march_paths import OMEGA, follow_path
 from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
@@ -13,8 +14,8 @@ from scipy.special import gammainc
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds
 from patchfem.motion_measures import energy_balance
-from patchfem.points.contacts import BondSum, make_bond_contact
-from patchfem.points.time_march import march
+from patchfem.time_steps.contacts import BondSum
+from patchfem.time_steps.time_march import march
 
 ROW = np.ones(1)
 FORCE = np.array([0.7, 1.3, 2.0, 0.4]) / 0.4  # normal forces of four points [N]

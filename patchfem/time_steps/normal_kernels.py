@@ -1,7 +1,7 @@
 """Normal contact of a patch whose pressure changes with heave and pitch, for a march (compiled).
 
-`system` is a `march_rows.System`. The first two entries of `ports.contact` are the numbers of the ports of heave and pitch.
-The contact carries its reference load and moment, less the derivatives of its energy by heave and pitch.
+`system` is a `march_rows_kernels.System`. The first two entries of `ports.contact` are the numbers of the ports of heave and
+pitch. The contact carries its reference load and moment, less the derivatives of its energy by heave and pitch.
 """
 
 from ..compiled.flags_kernels import NJIT_CALL
@@ -9,7 +9,7 @@ from ..compiled.jit import njit
 from ..contact.press_kernels import compute_energy, find_set, press_state
 from ..contact.press_path_kernels import path_mean
 from ..contact.set_arrays import PRESENT_SLOT_INDEX, REFERENCE_LOAD_INDEX, REFERENCE_MOMENT_INDEX
-from .march_rows import Port, Sample
+from .march_rows_kernels import Port, Sample
 from .motion_kernels import find_modal_energy, solve_holds, sum_products
 
 
@@ -73,7 +73,7 @@ def find_holds(system, state, drive):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march; `ports.vector` has the forces of the points of each port.
     state : (2 n,) array
         Modal coordinates and velocities.
@@ -108,7 +108,7 @@ def find_motion_energy(system):
 
 @njit(**NJIT_CALL)
 def write_sample(system, sample):
-    """Write load, moment and energy of the contact, heave and pitch to a sample, in the rows of `march_rows.Sample`."""
+    """Write load, moment and energy of the contact, heave and pitch to a sample (`march_rows_kernels.Sample`)."""
     ports = system.ports
     size = system.state.shape[1]
     up = ports.values[Port.SLIDE, int(ports.contact[0])]

@@ -8,51 +8,31 @@ from math import ceil
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss
 
 from .. import compiled
-from ..contact.set_arrays import PRESENT_SLOT_INDEX, hash_set, make_set_arrays
 from ..core import ModalBasis, Outcome, Response, SineDrive
-from ..friction.bonds.list_numbers import make_lists, make_no_lists
-from ..friction.bonds.strip_rows_kernels import BondLists, ListState
+from ..friction.bonds.strip_rows_kernels import ListState
 from ..friction.path_work import sampled_work
 from ..motion_measures import find_reversal_steps
 from ..structure import drive_sizes
-from ..structure.exponentials import exponential
 from ..structure.histories import INTERFACE_HISTORIES, find_accelerations, make_response
 from . import checkpoint
 from .contacts import Contact
-from .law_rows import Law
-from .laws import N_MEMORY, N_NUMBERS
-from .march_rows import (
+from .march_rows_kernels import (
     DONE,
     EXCEEDS_TRAVEL,
     LEAVES_GROOVES,
     N_PORT_COLUMNS,
     NO_CONTACT_SET,
     RESIDUAL,
-    RESULTANT,
     Flank,
-    Options,
-    Point,
-    Points,
-    Port,
-    Ports,
     Sample,
     Shear,
-    Structure,
     System,
     Total,
 )
+from .systems import copy_system, make_system
 
-MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
-N_GAUSS = 8  # Gauss points of the integrals over that step
-EVENT_LEVELS = (
-    20  # lengths of the steps with laws without memory: whole steps and nineteen halvings
-)
-SOFT_LEVELS = 4  # lengths of other steps, which are halved if they do not converge
-REDUNDANT = 1e-10  # relative compliance of the strongest port at rest if ports outnumber the modes
-MIN_STRENGTH = 0.01  # smallest strength by which ports share a force, relative to the strongest
 MAX_CYCLES_AT_ONCE = 8
 MAX_STEPS_AT_ONCE = 8000
 # Change of the state between two parts of a march, relative to its size, below which they repeat
@@ -140,394 +120,23 @@ class Motion:
 
 
 def load_kernels(contact: Contact, say=None):
-    """Return the compiled march with the parts that a contact needs: its laws, lists of bonds, contact sets."""
-    package = "points" if contact.engine is None else "time_steps"
-    parts = {}
-    if contact.bond_sum is None:
-        parts["lists"] = f"{package}.no_lists_kernels"
-    return load_loop(contact, f"{package}.march_kernels", parts, say)
-
-
-def load_loop(contact: Contact, module: str, parts: dict[str, str], say=None):
-    """Return the compiled loop of a march that solves steps by a module.
+    """Return the compiled march with the parts that a contact needs: lists of bonds, contact sets.
 
     Parameters
     ----------
     contact : Contact
-        Contact points, whose normal contact decides whether the march has contact sets.
-    module : str
-        Kernel module of the steps.
-    parts : dict of str
-        Modules that replace parts of this module.
+        Contact points.
     say : callable, optional
         Callback for a line of text.
     """
-    normal = {} if contact.sets is not None else {"normal": "points.no_normal_kernels"}
-    steps = compiled.instantiate(module, parts | normal, say)
-    return compiled.instantiate("points.loop_kernels", normal | {"steps": steps}, say)
-
-
-# ---- arrays of a march
-
-
-class Responses(NamedTuple):
-    """Motion, viscous loss and work of the drive in steps of several lengths, in the rows of `march_rows.Structure`.
-
-    N = 3 n + 3 inputs: 2 n coordinates and velocities, the drive with two derivatives, and n constant modal forces over
-    mass.
-
-    - motion: (levels, 2 n, N) motion at the end of a step per input
-    - loss: (levels, N, N) viscous loss [J] as a quadratic form of the inputs
-    - work: (levels, 3, N) work of the drive [J] as a bilinear form of the drive and the inputs
-    """
-
-    motion: np.ndarray
-    loss: np.ndarray
-    work: np.ndarray
-
-
-def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
-    """Return motion and energies of steps of several lengths.
-
-    The matrix exponential is that of the modes with the chain of derivatives of the drive and with constant forces.
-
-    Parameters
-    ----------
-    modes : ModalBasis
-        Modes of the rig.
-    step : float
-        Duration of a whole step [s].
-    levels : int
-        Number of lengths of steps.
-    """
-    # The state (3 n + 3,): coordinates, velocities, the acceleration of the base with two derivatives, and constant
-    # forces per mass.
-    n = modes.omega.size
-    matrix = np.zeros((3 * n + 3, 3 * n + 3))
-    velocities = slice(n, 2 * n)
-    matrix[:n, velocities] = np.eye(n)
-    matrix[velocities, :n] = -np.diag(modes.omega**2)
-    matrix[velocities, velocities] = -modes.damping_matrix
-    matrix[velocities, 2 * n] = -np.asarray(modes.base)
-    matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
-    matrix[velocities, 2 * n + 3 :] = np.eye(n)
-
-    # The first step resolves the fastest mode. As steps double, an integral of x(t)^T form x(t) is the sum of both halves.
-    fastest = float(modes.omega.max(initial=0.0)) * step
-    n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
-    short = step / 2**n_halvings
-    nodes, weights = leggauss(N_GAUSS)
-    # The units of these states are [m s^-power].
-    powers = np.concatenate([np.zeros(n), np.ones(n), [2, 3, 4], np.full(n, 2.0)])
-    loss = np.zeros_like(matrix)
-    loss[velocities, velocities] = modes.mass * modes.damping_matrix
-    work = np.zeros_like(matrix)
-    work[2 * n, velocities] = -modes.mass * np.asarray(modes.base)
-    inside = np.array([exponential(matrix, 0.5 * short * (1 + node), powers) for node in nodes])
-    forms = [
-        np.einsum("g,gki,kl,glj->ij", 0.5 * short * weights, inside, form, inside, optimize=True)
-        for form in (loss, work)
-    ]
-    parts = []
-    for k in range(n_halvings + 1):
-        # The square of the last matrix would double its round-off.
-        whole = exponential(matrix, short * 2**k, powers)
-        if k > n_halvings - levels:
-            parts.append((whole[: 2 * n], forms[0], forms[1][2 * n : 2 * n + 3]))
-        forms = [form + whole.T @ form @ whole for form in forms]
-    return Responses(*(np.array(part) for part in zip(*parts[::-1])))
-
-
-def make_system(
-    contact: Contact,
-    step: float,
-    modes: ModalBasis | None = None,
-    travel: float = np.inf,
-    start=None,
-) -> System:
-    """Return the arrays of a rig or of a prescribed slide at its start, without the drive.
-
-    Parameters
-    ----------
-    contact : Contact
-        Laws and loads of the points.
-    step : float
-        Duration of a whole step [s].
-    modes : ModalBasis, optional
-        Without modes the displacement of the first port is prescribed.
-    travel : float
-        Largest output [m].
-    start : core.InitialState, optional
-        Modal coordinates and velocities; at rest by default.
-    """
-    if contact.engine is not None:
-        return contact.engine.make_system(contact, step, modes, travel, start)
-    # Rows of the ports; heave and pitch of a normal contact are two more, with their numbers in the first entries of `press`
-    # (`Ports.contact`), which are -1 without them.
-    n = 0 if modes is None else modes.omega.size
-    rows = [
-        np.zeros(n) if modes is None else np.asarray(point_set.row, float)
-        for point_set in contact.point_sets
-    ]
-    press = np.zeros(11)
-    press[:2] = -1.0
-    if contact.sets is not None:
-        press[:2] = len(rows), len(rows) + 1
-        rows += [np.asarray(contact.heave, float), np.asarray(contact.pitch, float)]
-    rows = np.array(rows, float).reshape(len(rows), n)
-
-    laws = {
-        float(law)
-        for point_set in contact.point_sets
-        for law in np.unique(point_set.law.numbers[0])
-    }
-    # Laws without memory jump or nearly jump at a reversal, which short steps have to locate.
-    has_events = bool(laws & {Law.COULOMB, Law.TANH})
-    levels = EVENT_LEVELS if has_events else SOFT_LEVELS
-    mass = 1.0 if modes is None else float(modes.mass)
-
-    # Responses of the modes; a prescribed slide has none.
-    if modes is None:
-        responses = Responses(*(np.zeros((levels, k, 3)) for k in (0, 3, 3)))
-        shape = np.zeros((3, 0))
-        damping = np.zeros((0, 0))
-    else:
-        responses = make_responses(modes, step, levels)
-        shape = np.array([modes.omega**2, modes.base, modes.output], float)
-        damping = np.array(modes.damping_matrix, float)
-
-    # Compliance of the ports: rows . response to modal forces . rows^T.
-    by_force = responses.motion[:, :, 2 * n + 3 :]
-    compliance = [[rows @ part[:n] @ rows.T, rows @ part[n:] @ rows.T] for part in by_force]
-    points = _make_points(contact)
-    lists = _make_lists(contact, points)
-
-    state = np.zeros((3, 2 * n))
-    if start is not None:
-        state[0] = [*start.z, *start.v]
-
-    size = len(rows) + points.stiffness.size
-    ports = Ports(
-        rows,
-        np.array(compliance).reshape(levels, 2, len(rows), len(rows)) / mass,
-        rows @ rows.T / mass,
-        _find_redundant(rows, points),
-        np.zeros((len(Port), len(rows))),
-        np.zeros((size, size)),
-        np.zeros(size),
-        np.zeros(size),
-        press,
-    )
-
-    size = 3 * n + 3
-    structure = Structure(
-        *responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(size)
-    )
-
-    options = Options(
-        mass,
-        float(step),
-        float(travel),
-        max(float(contact.limit), 1e-300),
-        int(has_events),
-        int(Law.LIST in laws),
-        int(contact.has_loads),
-        int(laws == {Law.BONDS} and (points.numbers[3] < 0).all()),
-    )
-
-    sets = make_no_sets() if contact.sets is None else contact.sets.make_arrays()
-    flank = make_flank(contact)
-    totals = np.zeros(len(Total))
-    system = System(structure, ports, points, lists, flank, sets, state, totals, options)
-    # Springs and slips refer to the displacement at rest; rigid points slip from the start where their ports move.
-    slides = (rows @ state[0, :n])[points.port]
-    points.values[Point.TOTAL, : slides.size] = slides
-    is_spring = points.is_spring
-    first = points.memory[0]
-    first[is_spring] = slides[is_spring]
-    velocity = np.sign(rows @ state[0, n:])[points.port] * (points.numbers[0] == Law.COULOMB)
-    first[velocity != 0] = velocity[velocity != 0]
-    if contact.sets is not None:
-        press_first(system, contact)
-    if contact.grooves is not None and modes is not None:
-        _climb_first(system, contact)
-    points.trial[:] = points.memory
-    return system
-
-
-def _find_redundant(rows, points: Points) -> np.ndarray:
-    """Return the relative compliances (P,) of ports at rest, which are 0 unless ports outnumber the modes.
-
-    Such ports share their forces by the modal forces at which they slip, so that they reach their limits at once.
-
-    Parameters
-    ----------
-    rows : (P, n) array
-        Displacement of the ports per modal coordinate.
-    points : Points
-        Points at the ports, with their loads at the start.
-    """
-    count, n = rows.shape
-    if count <= n:
-        return np.zeros(count)
-    # Modal force at which each port slips, relative to the largest
-    limit = np.zeros(count)
-    friction = points.numbers[1] * points.values[Point.START_LOAD, : points.port.size]
-    np.add.at(limit, points.port, friction * ~points.is_spring)
-    strength = limit * np.linalg.norm(rows, axis=1)
-    largest = strength.max(initial=0.0)
-    share = strength / largest if largest > 0 else np.ones(count)
-    return REDUNDANT / np.maximum(share, MIN_STRENGTH)
-
-
-def _make_points(contact: Contact) -> Points:
-    """Return the arrays of all points."""
-    # Numbers, memory and loads of the laws of all points.
-    laws = [point_set.law for point_set in contact.point_sets]
-    counts = [law.numbers[0].size for law in laws]
-    numbers = _join_columns(N_NUMBERS, [law.numbers for law in laws])
-    n_memory = max([N_MEMORY, *(len(law.memory) for law in laws)])
-    memory = _join_columns(n_memory, [law.memory for law in laws])
-    loads = np.hstack([np.zeros(0), *(law.load + 0 * law.numbers[0] for law in laws)])
-    values = np.zeros((len(Point), loads.size))
-    values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD]] = loads
-
-    resultant = contact.preload
-    if contact.grooves is not None:
-        resultant *= float(np.hypot(1.0, contact.grooves.slope(0.0)))
-    # A single point carries a prescribed load that is 0 at the start.
-    share = loads / resultant if resultant > 0 else np.ones(loads.size)
-
-    # Nodes, shares of the load and shear shapes of each set of points.
-    nodes = np.full(loads.size, RESULTANT, np.int64)
-    position = np.zeros(loads.size)
-    shapes = np.zeros((0, loads.size))
-    stiffness = np.zeros(0)
-    first = 0
-    for point_set, count in zip(contact.point_sets, counts):
-        set_rows = slice(first, first + count)
-        if point_set.nodes is not None:
-            nodes[set_rows] = point_set.nodes
-        if point_set.shares is not None:
-            share[set_rows] = point_set.shares
-            position[set_rows] = point_set.places
-        if point_set.shear is not None:
-            shapes = np.zeros((len(point_set.shear.stiffness), loads.size))
-            shapes[:, set_rows] = np.asarray(point_set.shear.shape).T
-            stiffness = np.array(point_set.shear.stiffness, float)
-        first = first + count
-
-    shear = np.zeros((len(Shear), stiffness.size))
-    if stiffness.size:
-        shear[Shear.SCALE] = 1 / np.sqrt((shapes**2).mean(axis=1))
-    # Ports of heave and pitch have no points.
-    n_moving = 0 if contact.sets is None else 2
-    n_nodes = 0 if contact.sets is None else contact.sets.x.size
-    return Points(
-        np.repeat(np.arange(len(counts)), counts),
-        np.cumsum([0, *counts, *[0] * n_moving]),
-        nodes,
-        share,
-        numbers,
-        memory,
-        memory.copy(),
-        values,
-        shapes,
-        stiffness,
-        shear,
-        np.repeat([point_set.is_spring for point_set in contact.point_sets], counts).astype(bool),
-        position,
-        np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
-        np.zeros(n_nodes),
-    )
-
-
-def _join_columns(n_rows: int, parts: list[np.ndarray]) -> np.ndarray:
-    """Return the columns (n_rows, m) of all points, from the rows of each law; missing rows are 0.
-
-    The rows of a law, k of them with k <= n_rows, are (k,) for one point and (k, c) for c points.
-    """
-    columns = [part.reshape(len(part), -1) for part in parts]
-    padded = [np.pad(part, ((0, n_rows - len(part)), (0, 0))) for part in columns]
-    return np.hstack([np.zeros((n_rows, 0)), *padded])
-
-
-def _make_lists(contact: Contact, points: Points) -> BondLists:
-    """Return the lists of bonds of all points, which are empty for a contact without lists."""
-    count = points.port.size
+    parts = {}
+    if contact.sets is None:
+        parts["normal"] = "time_steps.no_normal_kernels"
+    lists = {}
     if contact.bond_sum is None:
-        return make_no_lists(count)
-    loads = np.where(points.numbers[0] == Law.LIST, points.values[Point.END_LOAD, :count], 0.0)
-    return make_lists(*contact.bond_sum, loads)
-
-
-def make_flank(contact: Contact) -> np.ndarray:
-    """Return the numbers of the flank of the first port, (0,) without grooves."""
-    grooves = contact.grooves
-    if grooves is None:
-        return np.zeros(0)
-    flank = np.zeros(len(Flank))
-    flank[Flank.LOAD] = flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL] = contact.preload
-    flank[Flank.WAVE_NUMBER] = grooves.wave_number
-    flank[Flank.AMPLITUDE] = grooves.amplitude
-    flank[Flank.PHASE] = grooves.phase
-    flank[Flank.LIFTED_MASS] = grooves.lifted_mass
-    flank[Flank.NORMAL] = contact.preload * np.hypot(1.0, float(grooves.slope(0.0)))
-    flank[Flank.RATIO] = 1.0
-    return flank
-
-
-def make_no_sets():
-    """Return arrays of contact sets with a single point, for a march in which no pressure changes and none is used."""
-    point = np.zeros(1)
-    return make_set_arrays(
-        np.ones((1, 1)), point, point, (1.0, 0.0, 0.0, 1.0, 1.0), np.zeros(1, bool), n_slots=1
-    )
-
-
-def press_first(system: System, contact: Contact) -> None:
-    """Find the contact set of a patch at the start, and write its index to the counters of `system.sets`."""
-    press = compiled.load_compiled_module("contact.press_kernels")
-    name = hash_set(system.sets, contact.sets.in_contact)
-    n = system.state.shape[1] // 2
-    heave, pitch = (
-        float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch)
-    )
-    slot = press.find_set(system.sets, press.build_first_set(system.sets, name), -heave, pitch)
-    system.sets.counters[PRESENT_SLOT_INDEX] = slot
-
-
-def _climb_first(system: System, contact: Contact) -> None:
-    """Give the lifted mass the vertical velocity of the flank, and the points the normal force there."""
-    ratio = find_first_climb(system, contact)
-    loads = [Point.START_LOAD, Point.LOAD, Point.END_LOAD]
-    system.points.values[loads] *= ratio
-    is_bonds = system.points.numbers[0] == Law.BONDS
-    system.points.memory[1] *= ratio
-    system.points.memory[2:4, is_bonds] *= ratio
-
-
-def find_first_climb(system: System, contact: Contact) -> float:
-    """Set normal force and vertical velocity of the flank at the start; return the ratio of the force to that at rest."""
-    n = system.state.shape[1] // 2
-    row = system.ports.rows[0]
-    q = float(row @ system.state[0, :n])
-    slope = float(contact.grooves.slope(q))
-    flank = system.flank
-    normal = flank[Flank.LOAD] * np.hypot(1.0, slope)
-    ratio = normal / flank[Flank.NORMAL]
-    flank[Flank.NORMAL] = normal
-    flank[Flank.RISE_SPEED] = slope * float(row @ system.state[0, n:])
-    return ratio
-
-
-def copy_system(system):
-    """Return a copy of nested tuples of arrays, in which the arrays are copied too."""
-    if isinstance(system, np.ndarray):
-        return system.copy()
-    if isinstance(system, tuple):
-        return type(system)(*map(copy_system, system))
-    return system
+        lists["lists"] = "time_steps.no_lists_kernels"
+    steps = compiled.instantiate("time_steps.march_kernels", parts | lists, say)
+    return compiled.instantiate("time_steps.loop_kernels", parts | {"steps": steps}, say)
 
 
 def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:
@@ -757,7 +366,7 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     Parameters
     ----------
     samples : (k + 1, w) array
-        Samples, in the rows of `march_rows.Sample`.
+        Samples, in the rows of `march_rows_kernels.Sample`.
     n : int
         Number of columns of the motion.
     scale : float
@@ -781,7 +390,7 @@ def make_snapshot(kernels, system: System, point_set, motion: tuple[float, ...])
     ----------
     kernels : module
         Compiled march.
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march.
     point_set : contacts.PointSet
         Points on the first port.

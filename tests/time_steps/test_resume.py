@@ -27,8 +27,8 @@ from scene_texts import (
 from patchfem import new
 from patchfem.export import run_folder
 from patchfem.export.folder import is_state_file
-from patchfem.points import checkpoint, time_march
 from patchfem.runs import refine
+from patchfem.time_steps import checkpoint, time_march
 
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
 SHORT_DRIVE = DRIVE.replace("cycles = 30", "cycles = 12.3071")
@@ -216,8 +216,8 @@ def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
     out = tmp_path / "out"
     scene.write_text(RIGS["one slide"].replace("cycles = 12.3071", "cycles = 4000"), "utf-8")
     code = (
-        "from patchfem.points import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "
-        "from patchfem.points import time_march; time_march.SAME_CYCLE = -1.0; "
+        "from patchfem.time_steps import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "
+        "from patchfem.time_steps import time_march; time_march.SAME_CYCLE = -1.0; "
         "from patchfem.__main__ import main; main()"
     )
     command = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]

@@ -10,7 +10,7 @@ from math import cos, sin, sqrt
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from .march_rows import Flank, Port, Sample
+from .march_rows_kernels import Flank, Port, Sample
 
 GAUSS_POINT = sqrt(0.6)  # outer node of the Gauss rule of three points
 MIN_PHASE = 1e-4  # phase [rad] below which a series replaces sin(x)/x
@@ -33,7 +33,7 @@ def climb(flank, q, dq, dt):
     Parameters
     ----------
     flank : (k,) array
-        Numbers of the flanks, in the rows of `march_rows.Flank`.
+        Numbers of the flanks, in the rows of `march_rows_kernels.Flank`.
     q : float
         Slide [m].
     dq : float
@@ -62,7 +62,7 @@ def find_stiffness(flank, q, dq, dt):
     Parameters
     ----------
     flank : (k,) array
-        Numbers of the flanks, in the rows of `march_rows.Flank`.
+        Numbers of the flanks, in the rows of `march_rows_kernels.Flank`.
     q : float
         Slide [m].
     dq : float
@@ -86,9 +86,9 @@ def add_climb(flank, moves, dq, dt, end):
     Parameters
     ----------
     flank : (k,) array
-        Numbers of the flanks, in the rows of `march_rows.Flank`; TRIAL_FORCE becomes `end`.
+        Numbers of the flanks, in the rows of `march_rows_kernels.Flank`; TRIAL_FORCE becomes `end`.
     moves : (k, p) array
-        Values of the ports, in the rows of `march_rows.Port`.
+        Values of the ports, in the rows of `march_rows_kernels.Port`.
     dq : float
         Increment of the slide [m].
     dt : float
@@ -132,7 +132,7 @@ def accept_climb(flank, dq, dt):
     Parameters
     ----------
     flank : (k,) array
-        Numbers of the flanks, in the rows of `march_rows.Flank`.
+        Numbers of the flanks, in the rows of `march_rows_kernels.Flank`.
     dq : float
         Increment of the slide [m].
     dt : float
@@ -155,13 +155,13 @@ def write_sample(flank, q, path, sample, size):
     Parameters
     ----------
     flank : (k,) array
-        Numbers of the flanks, in the rows of `march_rows.Flank`.
+        Numbers of the flanks, in the rows of `march_rows_kernels.Flank`.
     q : float
         Slide [m].
     path : float
         Displacement of the point along the flank [m].
     sample : (k,) array
-        Sample, in the rows of `march_rows.Sample`; output.
+        Sample, in the rows of `march_rows_kernels.Sample`; output.
     size : int
         Number of modal coordinates and velocities, the first columns.
     """

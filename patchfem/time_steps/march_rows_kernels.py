@@ -7,6 +7,7 @@ import numpy as np
 
 from ..contact.set_arrays import SetArrays
 from ..friction.bonds.strip_rows_kernels import BondLists
+from .step_rows_kernels import Points
 
 # Statuses of a march
 DONE = 0
@@ -19,33 +20,8 @@ LOWER = -2  # node of a point whose load is the pressure of the lower piece at i
 RESIDUAL = 1e-12
 
 
-class Point(IntEnum):
-    """Rows of `Points.values`.
-
-    - START_LOAD, LOAD, END_LOAD: load at start, middle and end of a step [N]
-    - SLIDE, FORCE: slide in the step [m] and its path-mean force [N]
-    - BY_SLIDE, BY_VELOCITY: derivatives of this force by the slide [N/m] and by the velocity at the end [N s/m]
-    - TOTAL: slide since the start [m]
-    - TRIAL_SLIDE, TRIAL_FORCE: slide [m] and force [N] of the last trial of a list of bonds
-    - SPEED, LAST_SPEED: extrapolated speed [m/s] of the next step, and speed of the last one
-    """
-
-    START_LOAD = 0
-    LOAD = 1
-    END_LOAD = 2
-    SLIDE = 3
-    FORCE = 4
-    BY_SLIDE = 5
-    BY_VELOCITY = 6
-    TOTAL = 7
-    TRIAL_SLIDE = 8
-    TRIAL_FORCE = 9
-    SPEED = 10
-    LAST_SPEED = 11
-
-
 class Port(IntEnum):
-    """Rows of `Ports.values`; those from FIRST on belong to the march of `time_steps`.
+    """Rows of `Ports.values`.
 
     - SLIDE, VELOCITY: at the start of a step [m], [m/s]
     - FREE, FREE_VELOCITY: increment and velocity at the end without forces [m], [m/s]
@@ -173,40 +149,6 @@ class Sample(IntEnum):
 N_PORT_COLUMNS = 3  # force, slip and mean force of the following step
 
 
-class Points(NamedTuple):
-    """Points with laws; m points, r shear coordinates of the pieces.
-
-    - port (m,), first (P + 1,): port on which the point acts, and first point of each port
-    - node (m,): node whose force is the load of the point; -1 for a fraction `share` of the resultant, -2 for `share`
-      times the pressure of the lower piece at the place of the point
-    - share (m,): fraction of the resultant, factor of the pressure, or the load [N] where it is constant
-    - numbers (k, m), memory, trial (l, m): see `return_maps_kernels`
-    - values (12, m): see `Point`
-    - shapes (r, m), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
-    - shear (8, r): see `Shear`
-    - is_spring (m,): whether the point is a spring, whose work is not friction
-    - place (m,): position of the point at rest [m]
-    - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
-    - nodal (n,): forces of the nodes of a patch [N]
-    """
-
-    port: np.ndarray
-    first: np.ndarray
-    node: np.ndarray
-    share: np.ndarray
-    numbers: np.ndarray
-    memory: np.ndarray
-    trial: np.ndarray
-    values: np.ndarray
-    shapes: np.ndarray
-    stiffness: np.ndarray
-    shear: np.ndarray
-    is_spring: np.ndarray
-    place: np.ndarray
-    pressure: np.ndarray
-    nodal: np.ndarray
-
-
 class Ports(NamedTuple):
     """P ports on n modes.
 
@@ -264,8 +206,7 @@ class Options(NamedTuple):
 
     - mass [kg], step [s], travel [m]: modal mass, duration of a step, largest output
     - scale: force [N] to whose 1e-11 part a step is solved
-    - has_events, has_lists, has_loads: 1 if points have laws without memory, lists of bonds, or loads that change
-    - has_only_bonds: 1 if all points have bonds whose length does not grow, see `bonds_kernels`
+    - has_events, has_lists, has_loads: 1 if points have rigid friction, lists of bonds, or loads that change
     """
 
     mass: float
@@ -275,7 +216,6 @@ class Options(NamedTuple):
     has_events: int
     has_lists: int
     has_loads: int
-    has_only_bonds: int
 
 
 class System(NamedTuple):

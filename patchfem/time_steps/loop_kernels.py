@@ -1,16 +1,8 @@
 """Loop of a march: whole steps, their halving, ports that return to rest, energies and samples (compiled).
 
-The loop does not know how points are solved. This is the part `steps`, either `points.march_kernels` or
-`time_steps.march_kernels`; `compiled.instantiate` puts it in. Both have these functions:
+`march_kernels` solves the steps. It is the part `steps`, which `compiled.instantiate` puts in with the parts of a rig.
 
-- `solve_step`: port forces and shear increments of a step; whether they were found
-- `find_event`: whether a step must be halved because rigid friction changes its regime in it
-- `commit`: memories, loads and shear coordinates after an accepted step, and `Total.REST` of its ports at rest
-- `is_held`, `sum_forces`, `find_path`: whether a port is at rest, and force and path of the points of a port
-- `press_at_rest`: loads of the points at the present state
-- `write_ports`, `add_work`, `read_points`: columns of a sample, friction work, and the state of the points
-
-`system` is a `march_rows.System`. A step of level k lasts a whole step over 2^k.
+`system` is a `march_rows_kernels.System`. A step of level k lasts a whole step over 2^k.
 """
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
@@ -19,7 +11,7 @@ from ..contact.set_arrays import PRESENT_SLOT_INDEX
 from . import flanks_kernels as flanks
 from . import march_kernels as steps
 from . import normal_kernels as normal
-from .march_rows import (
+from .march_rows_kernels import (
     DONE,
     EXCEEDS_TRAVEL,
     LEAVES_GROOVES,
@@ -60,7 +52,7 @@ def try_step(system, level, row, begin, end, drive):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     level : int
         Level of the step, which lasts a whole step over 2^level.
@@ -151,12 +143,12 @@ def write_sample(system, row, sample):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march, changed in place.
     row : int
         Number of the whole step.
     sample : (k,) array
-        Sample, in the rows of `march_rows.Sample`; output.
+        Sample, in the rows of `march_rows_kernels.Sample`; output.
     """
     ports = system.ports
     points = system.points
@@ -208,7 +200,7 @@ def march(system, n_steps, samples):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Changed in place.
     n_steps : int
         Number of steps.
@@ -273,7 +265,7 @@ def read_points(system, forces, stretch, loads):
 
     Parameters
     ----------
-    system : march_rows.System
+    system : march_rows_kernels.System
         Arrays of the march.
     forces, stretch, loads : (m,) array
         Output.
