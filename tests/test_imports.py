@@ -44,7 +44,7 @@ PHYSICS = set(
 )
 PIECES = "contact elasticity mesh "  # folders needed to solve a static patch
 MOTION = "compiled hybrid response structure "  # folders needed to integrate the motion of a rig
-BENCH_FOLDERS = "friction points response "  # folders needed to follow a prescribed slide
+BENCH_FOLDERS = "friction response "  # folders needed to follow a prescribed slide
 WEAR = '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
 FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run` loads for the run and its page
     "static patch": (PATCH, PIECES),

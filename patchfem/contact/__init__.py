@@ -30,7 +30,6 @@ PUBLIC = {
         "solve_bounded",
     ),
     "cells": (
-        "BlockCompliance",
         "make_block",
     ),
     "contact_sets": ("ContactSets",),

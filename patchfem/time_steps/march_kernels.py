@@ -70,7 +70,7 @@ LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
 # compliance of ports that share a force (`time_march.REDUNDANT`)
 CREEP = 1e-7
-TINY = 1e-300  # m, in place of no path
+TINY = 1e-150  # m, in place of no path; its square is not zero
 
 
 @njit(**NJIT_CALL)
