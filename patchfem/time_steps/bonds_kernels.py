@@ -176,15 +176,16 @@ def finish_bonds(numbers, memory, trial, values, count, step):
             if step.duration > 0 and damping + viscous > 0:
                 m = 0.5 * (memory[WIDTH + j] + trial[WIDTH + j])
                 # The bonds are damped as the slide stretches them, not as a change of load breaks them.
-                bonds = memory[WIDTH + j], memory[2 * WIDTH + j], memory[3 * WIDTH + j]
-                start = press_point(
-                    bonds,
-                    values[Value.START_LOAD + j],
-                    middle,
-                    numbers[BondRow.INITIAL + j],
-                    numbers[BondRow.LENGTH + j],
-                )
-                values[Value.MEAN + j] += damping * (z - start.z) / step.duration
+                first = memory[2 * WIDTH + j]
+                if numbers[BondRow.IS_KEPT + j] == 0:
+                    first = press_point(
+                        (memory[WIDTH + j], first, memory[3 * WIDTH + j]),
+                        values[Value.START_LOAD + j],
+                        middle,
+                        numbers[BondRow.INITIAL + j],
+                        numbers[BondRow.LENGTH + j],
+                    ).z
+                values[Value.MEAN + j] += damping * (z - first) / step.duration
                 values[Value.MEAN + j] += viscous * middle * slide / step.duration
                 values[Value.MEAN_BY_SLIDE + j] += (damping * m + viscous * middle) / step.duration
             direction = 1.0 if velocity > 0 else -1.0

@@ -128,3 +128,17 @@ def test_slopes_are_derivatives(name, load):
                 by_slide[Value.MEAN] - here[Value.MEAN_BY_SLIDE],
             ]
         np.testing.assert_allclose(errors, 0.0, atol=3e-4 * stiffness)
+
+
+@pytest.mark.parametrize("name", ["nonlocal", "damped lugre"])
+def test_exact_kept_bonds_do_not_notice_a_change_of_load_at_rest(name):
+    """Bonds that keep the load under which they formed keep force and energy at rest, until the point has no load."""
+    damped = LuGre(0.3, 0.25, 0.3 / LENGTH, 1e-3, 50.0, 0.0)
+    law = laws.make_lugre(damped, LOAD) if name == "damped lugre" else LAWS[name]
+    point = Point(laws.keep_loads(law))
+    point.slide(0.5 * LENGTH, 0.0, LOAD)
+    before = point.slide(0.0, 0.0, LOAD)
+    after = point.slide(0.0, 0.0, 0.3 * LOAD)
+    for row in (Value.END, Value.MEAN, Value.ENERGY, Value.STRETCH):
+        assert after[row] == pytest.approx(before[Value.END if row == Value.MEAN else row])
+    assert point.slide(0.0, 0.0, 0.0)[Value.END] == 0.0
