@@ -1578,10 +1578,10 @@ class Result(run_result.Result):
     def to_pyvista(self, frame: int | None = -1) -> Any:
         """Return both pieces and their interface as PyVista grids, with the fields of fields.vtkhdf.
 
-        The blocks are `lower`, `upper` and `interface`. The pieces
-        have the arrays `displacement`, `stress` (xx, yy, zz, xy, 0, 0; tension positive), `von_mises` and `material`. The
-        interface has `normal_stress` (compression positive), `gap` and, after a motion, `shear_stress`, `slip` and
-        `status`, all in SI units. The field array `TimeValue` of each grid is the time [s].
+        The blocks are `lower`, `upper` and `interface`; with [contact.area] there is only `interface`, whose cells are those
+        of the face. The pieces have the arrays `displacement`, `stress` (xx, yy, zz, xy, 0, 0; tension positive),
+        `von_mises` and `material`. The interface has `normal_stress` (compression positive), `gap` and, after a motion,
+        `shear_stress`, `slip` and `status`, all in SI units. The field array `TimeValue` of each grid is the time [s].
 
         Parameters
         ----------

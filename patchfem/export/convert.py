@@ -9,7 +9,8 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from . import lab, pieces, store
 from .charts.axes import PICTURE_ENDINGS
-from .fields import grids, image
+from .fields import grids
+from .fields.blocks import VTK_FIELDS
 from .fields.vtkhdf import VTKHDF_FILE, Frames, find_fields, read_frames
 from .lab import write
 
@@ -56,15 +57,10 @@ def export_results(
         grids.create_folder(out.parent)
         return write.export_histories(folder, out)
     _refuse_field_format(out, frame, histories=histories)
-    path = find_fields(folder)
-    has_face = image.is_image(path)
-    frames = image.read_image(path) if has_face else read_frames(path)
+    frames = read_frames(find_fields(folder))
     number = grids.find_frame(frames, frame)
     grids.create_folder(out.parent)
-    if has_face:
-        image.export_image(frames, out, number)
-    else:
-        grids.export_frames(frames, out, number)
+    grids.export_frames(frames, out, number)
     if out.suffix in SERIES_FORMATS:
         return f"{out}: {len(frames.times)} frames"
     return f"{out}: frame {number} of 0 to {len(frames.times) - 1}, {frames.times[number]:.6g} s"
@@ -137,15 +133,13 @@ def view_results(
             f"--frame: {out.suffix} shows all frames of the motion; use a .png for one frame"
         )
 
-    path = find_fields(folder)
-    has_face = image.is_image(path)
-    frames = image.read_image(path) if has_face else read_frames(path)
+    frames = read_frames(find_fields(folder))
     number = grids.find_frame(frames, frame)
     # the folder of an interface has fields alone
     has_summary = (folder / store.SUMMARY_FILE).is_file()
     title = store.read_summary(folder).title if has_summary else ""
     title = title or folder.resolve().name
-    if has_face and is_film:
+    if frames.is_face and is_film:
         raise PatchfemError(
             f"{out}: a face is shown as a picture of one frame; write .png and give --frame"
         )
@@ -153,14 +147,12 @@ def view_results(
         _open_window(frames, number, title)
         return ""
     grids.create_folder(out.parent)
-    if has_face:
-        return image.write_face_picture(frames, number, title, out)
     if is_film:
         return pieces.write_film(frames, title, magnify, out)
     return pieces.write_picture(frames, number, title, magnify, out)
 
 
-def _open_window(frames: "Frames | image.FaceFrames", number: int, title: str) -> None:
+def _open_window(frames: Frames, number: int, title: str) -> None:
     """Open a window with the von Mises stress in both pieces, or with the pressure over a face.
 
     `number` is the index of the frame to show, and `title` that of the window. Missing is raised if there is no screen.
@@ -174,15 +166,10 @@ def _open_window(frames: "Frames | image.FaceFrames", number: int, title: str) -
     import pyvista as pv
 
     plotter = pv.Plotter(title=f"patchfem: {title}")
-    if isinstance(frames, image.FaceFrames):
-        grid = grids.make_image_grid(frames, number)
-        plotter.add_mesh(grid, scalar_bar_args={"title": "normal stress [Pa]"})
-        plotter.view_xy()
-        plotter.show()
-        return
-    parts = grids.make_grids(frames.blocks, number, float(frames.times[number]))
-    for side in ("lower", "upper"):
-        bar = {"title": "von Mises stress [Pa]"}
-        plotter.add_mesh(parts[side], scalars="von_mises", scalar_bar_args=bar)
+    blocks = grids.select_shown_blocks(frames)
+    for grid in grids.make_grids(blocks, number, float(frames.times[number])):
+        name = grid.active_scalars_name
+        bar = {"title": f"{name.replace('_', ' ')} [{VTK_FIELDS[name].unit}]"}
+        plotter.add_mesh(grid, scalar_bar_args=bar)
     plotter.view_xy()
     plotter.show()

@@ -13,16 +13,15 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_atomically
 from ..formatting import choose_axis_unit
-from ..runs.pieces import compute_pieces
 from .charts.axes import save_figure
-from .fields import image
-from .fields.blocks import make_blocks
+from .fields.blocks import VTK_FIELDS
 from .fields.film import contact_window, last_frames
-from .fields.vtkhdf import Frames
+from .fields.vtkhdf import Frames, collect_frames
 
 FILM_ENDINGS = (".gif", ".mp4", ".html")
 # Width and height; with PIXELS_PER_INCH they give even numbers of pixels, which video formats need
 FIGURE_SIZE_INCHES = (12.0, 5.2)
+FACE_SIZE_INCHES = (11.0, 8.0)  # width and height of the maps of a face
 PIXELS_PER_INCH = 100
 FILM_SECONDS = 2.4  # duration of a film [s] within the limits of the frame rate
 FRAME_RATE_LIMITS_HZ = (3.0, 25.0)
@@ -31,6 +30,8 @@ DRAWN_SLIDE_FRACTION = 0.03  # largest slide of the upper piece as drawn, over i
 # Fraction of the stresses that the colours cover; larger ones are peaks in corners.
 COLOURED_STRESS_FRACTION = 0.998
 MM_PER_M = 1e3
+# Fields of the picture of a face, in the order of its panels
+DRAWN_FIELDS = ("normal_stress", "gap", "shear_stress", "slip")
 
 
 # left, right, bottom and top of a picture [m]
@@ -218,15 +219,55 @@ def draw_pieces(
 
 
 def draw_result(result, onto=None):
-    """Draw the pieces of a run at its end; return the Axes, which are `onto` if it is given."""
-    if result.patch.model.area is not None:
-        faces = image.collect_face_frames(result)
-        figure = image.draw_face(faces, len(faces.times) - 1, onto=onto)
-        return onto or figure.axes[0]
-    computed = compute_pieces(result)
-    frames = Frames(Path(), computed.time, make_blocks(computed))
-    figure, _ = draw_pieces(frames, np.array([len(computed.time) - 1]), onto=onto)
+    """Draw the pieces or the face of a run at its end; return the Axes, which are `onto` if it is given."""
+    figure = draw_frame(collect_frames(result), -1, onto=onto)
     return onto or figure.axes[0]
+
+
+def draw_frame(frames: Frames, number: int, title: str = "", magnify=None, onto=None):
+    """Draw the pieces with their stress, or the fields over a face, in one frame, and return the figure.
+
+    Parameters
+    ----------
+    frames : Frames
+        Fields of a run.
+    number : int
+        Number of the frame.
+    title : str
+        First words of the title.
+    magnify : float, optional
+        Factor of the motion of pieces; None for one that makes it visible.
+    onto : matplotlib Axes, optional
+        Axes for the pieces, or for the pressure over a face.
+    """
+    if not frames.is_face:
+        figure, _ = draw_pieces(
+            frames, np.array([number % len(frames.times)]), title, magnify, onto
+        )
+        return figure
+    block = frames.blocks["interface"]
+    panels = {name: block.cell_data[name] for name in DRAWN_FIELDS if name in block.cell_data}
+    if onto is not None:
+        axes_list = [onto]
+    else:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=FACE_SIZE_INCHES, dpi=PIXELS_PER_INCH, layout="constrained")
+        axes_list = figure.subplots(2, 2).ravel()
+        figure.suptitle(f"{title}, {frames.times[number]:.6g} s")
+
+    # A map of each field
+    x, y = (np.unique(block.points[:, k]) for k in (0, 1))
+    length_unit, length_scale = choose_axis_unit([x[-1]], "m")
+    for axes, (name, values) in zip(axes_list, panels.items()):
+        values = values[number % len(values)].reshape(y.size - 1, x.size - 1)
+        unit, scale = choose_axis_unit([np.abs(values).max()], VTK_FIELDS[name].unit)
+        cells = axes.pcolormesh(length_scale * x, length_scale * y, scale * values, cmap="viridis")
+        axes.figure.colorbar(cells, ax=axes, label=f"{name.replace('_', ' ')} [{unit}]")
+        axes.set(aspect="equal", xlabel=f"x [{length_unit}]", ylabel=f"y [{length_unit}]")
+    for axes in axes_list[len(panels) :]:
+        axes.set_axis_off()
+    return axes_list[0].figure
 
 
 def write_picture(frames: Frames, number: int, title: str, magnify: float | None, out: Path) -> str:
@@ -235,7 +276,7 @@ def write_picture(frames: Frames, number: int, title: str, magnify: float | None
     Parameters
     ----------
     frames : Frames
-        Fields of both pieces.
+        Fields of a run.
     number : int
         Number of the frame.
     title : str
@@ -246,7 +287,7 @@ def write_picture(frames: Frames, number: int, title: str, magnify: float | None
         File to write.
     """
     with write_atomically(out) as partial:
-        figure, _ = draw_pieces(frames, np.array([number]), title, magnify)
+        figure = draw_frame(frames, number, title, magnify)
         save_figure(figure, partial, out.suffix[1:].lower(), 1.5 * PIXELS_PER_INCH)
     last = len(frames.times) - 1
     return f"{out}: {title}, frame {number} of 0 to {last}, {frames.times[number]:.6g} s"

@@ -14,7 +14,7 @@ from ..runs.results.result import Result, shorten_file_names
 from ..runs.run import StateFile, is_march, run
 from . import page, store
 from .answer import Answer
-from .fields import image, vtkhdf
+from .fields import vtkhdf
 from .folder import WEAR_STATE_FILE, Folder, list_states
 from .runs import make_answer
 
@@ -162,7 +162,7 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     start_time = process_time()
     notes = result.notes
     if result.patch is not None:
-        _write_fields(result, folder / store.FIELDS_FILE)
+        vtkhdf.write_fields(result, folder / store.FIELDS_FILE)
     for face in result.faces[:MAX_WRITTEN_INTERFACES]:
         face_notes = _write_face(result, face, folder / INTERFACES_FOLDER / face.folder)
         notes += [f"interface {face.name}: {note}" for note in face_notes]
@@ -172,14 +172,6 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
         answer = replace(answer, details=answer.details | {"case": case})
     store.write_answer(answer, folder)
     return answer
-
-
-def _write_fields(result: Result, path: Path) -> None:
-    """Write the fields of both pieces of a run, or those over a face; notes on yielding are added to the result."""
-    if result.patch.model.area is None:
-        vtkhdf.write_fields(result, path)
-    else:
-        image.write_image(image.collect_face_frames(result), path)
 
 
 def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
@@ -195,7 +187,7 @@ def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
         fields=face.fields,
         notes=[],
     )
-    _write_fields(face_result, folder / store.FIELDS_FILE)
+    vtkhdf.write_fields(face_result, folder / store.FIELDS_FILE)
     return face_result.notes
 
 

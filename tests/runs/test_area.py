@@ -200,10 +200,26 @@ def test_exact_files_hold_the_face(tmp_path, rolled):
     pv = pytest.importorskip("pyvista")
     result = run_block(tilt(0, 0.1) | {"shear": {}}, friction=COULOMB, slide=SLIDE)
     answer = run_folder.save_run(result, tmp_path / "out")
-    grid = pv.read(tmp_path / "out" / "fields.vtkhdf")
-    cell = 12.7e-3 / 64
-    assert grid.dimensions == (65, 65, 1)
-    assert grid.cell_data["normal_stress"].sum() * cell**2 == pytest.approx(LOAD, rel=1e-9)
+    face = pv.read(tmp_path / "out" / "fields.vtkhdf")["interface"]
+    sizes = face.compute_cell_sizes()["Area"]
+    assert face.n_cells == 64**2 and sizes == pytest.approx((12.7e-3 / 64) ** 2, rel=1e-5)
+    forces = face.cell_data["normal_stress"] * face.cell_data["weight"]
+    assert forces.sum() == pytest.approx(LOAD, rel=1e-9)
+    assert face.cell_centers().points[:, 1] @ forces < -4e-3 * LOAD
+    grids = result.to_pyvista()
+    assert np.array_equal(grids["interface"]["normal_stress"], result.patch.normal_stress)
+
+    # The frames of the file in the other formats
+    folder = tmp_path / "out"
+    for name in ("face.vtu", "face.pvd", "face.vtkhdf", "face.csv"):
+        pf.export(folder, folder / name)
+    assert pv.read(folder / "face.vtu").n_cells == 64**2
+    table = np.genfromtxt(folder / "face.csv", delimiter=",", names=True)
+    assert table["normal_stress_Pa"].sum() == pytest.approx(LOAD / (12.7e-3 / 64) ** 2, rel=1e-6)
+    pf.view(folder, folder / "face.png")
+    assert (folder / "face.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(pf.PatchfemError, match="picture of one frame"):
+        pf.view(folder, folder / "face.gif")
     assert answer.data["normal_stress"].dims == ("frame", "y", "x")
     assert answer.data["reversal_status"].values.shape == (64, 64)
     shown = panels.make_panels({"": answer}, CHARTS["bench"])

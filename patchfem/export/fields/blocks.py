@@ -1,4 +1,4 @@
-"""Both pieces and their interface as named blocks of cells with fields, and the table of fields."""
+"""Both pieces and their interface, or a face, as named blocks of cells with fields, and the table of fields."""
 
 from typing import NamedTuple
 
@@ -81,6 +81,25 @@ def make_blocks(pieces: Pieces) -> dict[str, Block]:
         "upper": _piece_block(pieces.upper),
         "interface": Block(_pad_components(x[:, None], 3), segments, _convert_fields(fields), {}),
     }
+
+
+def make_face_blocks(result) -> dict[str, Block]:
+    """Return the cells of the face of a run with [contact.area] as the block of the interface."""
+    patch = result.patch
+    rows, columns = patch.shape
+    pieces = patch.model.pieces
+    x, y = np.meshgrid(
+        np.linspace(-pieces.length / 2, pieces.length / 2, columns + 1),
+        np.linspace(-pieces.width / 2, pieces.width / 2, rows + 1),
+    )
+    points = _pad_components(np.stack([x.ravel(), y.ravel()], axis=1), 3)
+    first = np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)
+    corners = first.ravel()[:, None] + np.array([0, 1, columns + 2, columns + 1])
+    fields = {"weight": patch.pieces.interface.weight[None]}
+    for name, values in result.fields.items():
+        if name in VTK_FIELDS and np.shape(values)[1:] == patch.x.shape:
+            fields[name] = values
+    return {"interface": Block(points, corners, {}, _convert_fields(fields))}
 
 
 def _piece_block(piece: PieceFields) -> Block:

@@ -10,10 +10,8 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import explain_mkdir_error, write_rows, write_text
-from ...runs.pieces import compute_pieces
-from . import image
-from .blocks import STORED_PARTS, VTK_FIELDS, Block, make_blocks
-from .vtkhdf import Frames, write_blocks
+from .blocks import VTK_FIELDS, Block
+from .vtkhdf import Frames, collect_frames, write_blocks
 
 if TYPE_CHECKING:
     from pyvista import MultiBlock
@@ -66,36 +64,16 @@ def _label_units(grid) -> None:
             information.Set(vtkDataArray.UNITS_LABEL(), VTK_FIELDS[name].unit)
 
 
-def make_image_grid(frames: image.FaceFrames, number: int):
-    """Return one frame of the fields over a face as a pyvista.ImageData, in SI units."""
-    import pyvista as pv
-
-    grid = pv.ImageData(
-        dimensions=(frames.x.size, frames.y.size, 1),
-        spacing=(frames.x[1] - frames.x[0], frames.y[1] - frames.y[0], 1.0),
-        origin=(frames.x[0], frames.y[0], 0.0),
-    )
-    for name, values in frames.fields.items():
-        grid.cell_data[name] = values[number].ravel()
-    grid.field_data["TimeValue"] = [frames.times[number]]
-    grid.set_active_scalars("normal_stress")
-    return grid
-
-
 def make_result_grids(result: Result, numbers: Iterable[int]) -> list[MultiBlock]:
-    """Return frames of a run with a patch as pyvista.MultiBlock objects, or as pyvista.ImageData of a face, in SI."""
-    if result.patch.model.area is not None:
-        frames = image.collect_face_frames(result)
-        return [make_image_grid(frames, number) for number in numbers]
-    pieces = compute_pieces(result)
-    blocks = make_blocks(pieces)
-    return [make_grids(blocks, number, float(pieces.time[number])) for number in numbers]
+    """Return frames of a run with a patch as pyvista.MultiBlock objects, in SI."""
+    frames = collect_frames(result)
+    return [make_grids(frames.blocks, number, float(frames.times[number])) for number in numbers]
 
 
 def export_frames(frames: Frames, out: Path, number: int) -> None:
     """Write fields as .vtu or .csv of one frame, or as .pvd or .vtkhdf of all frames.
 
-    A .vtu has both pieces, a .csv the interface.
+    A .vtu has both pieces or the face, a .csv the interface.
 
     Parameters
     ----------
@@ -112,8 +90,7 @@ def export_frames(frames: Frames, out: Path, number: int) -> None:
         _write_pvd(frames, out)
     elif out.suffix == ".vtu":
         time = float(frames.times[number])
-        pieces = {side: frames.blocks[side] for side in ("lower", "upper")}
-        grid = make_grids(pieces, number, time).combine()
+        grid = make_grids(select_shown_blocks(frames), number, time).combine()
         grid.field_data["TimeValue"] = [time]
         _write_vtu(grid, out)
     else:
@@ -143,7 +120,7 @@ def _write_pvd(frames: Frames, out: Path) -> None:
     lines = []
     for number, time in enumerate(frames.times.tolist()):
         grids = make_grids(frames.blocks, number, time)
-        for code, part in enumerate(STORED_PARTS):
+        for code, part in enumerate(frames.blocks):
             name = f"{part}_{number:04d}.vtu"
             _write_vtu(grids[part], folder / name)
             lines.append(
@@ -154,13 +131,17 @@ def _write_pvd(frames: Frames, out: Path) -> None:
 
 
 def _write_csv(frames: Frames, out: Path, number: int) -> None:
-    """Write the interface of a frame as a table in SI, one row per point.
+    """Write the interface of a frame as a table in SI, one row per point, or per cell of a face.
 
     `number` is the index of the frame.
     """
     line = frames.blocks["interface"]
-    columns = {"x [m]": line.points[:, 0]}
-    for name, series in line.point_data.items():
+    if frames.is_face:
+        centres = line.points[line.cells].mean(axis=1)
+        columns = {"x [m]": centres[:, 0], "y [m]": centres[:, 1]}
+    else:
+        columns = {"x [m]": line.points[:, 0]}
+    for name, series in (line.point_data | line.cell_data).items():
         values = series[number % len(series)]
         unit = VTK_FIELDS[name].unit
         if values.ndim == 1:
@@ -168,6 +149,13 @@ def _write_csv(frames: Frames, out: Path, number: int) -> None:
         else:
             columns |= {f"{name}_{axis} [{unit}]": values[:, k] for k, axis in enumerate("xy")}
     write_rows(out, [columns, *zip(*columns.values())])
+
+
+def select_shown_blocks(frames: Frames) -> dict[str, Block]:
+    """Return the blocks of a picture: both pieces, or the face."""
+    if frames.is_face:
+        return frames.blocks
+    return {side: frames.blocks[side] for side in ("lower", "upper")}
 
 
 def create_folder(folder: Path) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import open_lossy, write_atomically
 from ...runs.pieces import add_yielding_notes, compute_pieces, number_distinct_frames
-from .blocks import STORED_PARTS, VTK_FIELDS, Block, make_blocks
+from .blocks import STORED_PARTS, VTK_FIELDS, Block, make_blocks, make_face_blocks
 
 VTKHDF_FILE = "fields.vtkhdf"  # name of the file in a results folder
 # Version of the format VTKHDF
@@ -24,23 +24,48 @@ REQUIRED_FIELDS = {
     "upper": {"displacement", "von_mises"},
     "interface": {"displacement", "gap", "holder_slide", "normal_stress"},
 }
+# Fields of the cells of a face, which is the only part of its file
+REQUIRED_FACE_FIELDS = {"gap", "normal_stress", "weight"}
 
 
 class Frames(NamedTuple):
-    """Fields of both pieces and their interface in all frames of a file.
+    """Fields of both pieces and their interface, or of a face, in all frames of a file.
 
     - path: the file.
     - times (f,): [s].
-    - blocks: `lower`, `upper` and `interface`.
+    - blocks: `lower`, `upper` and `interface`; only the last one of a face.
     """
 
     path: Path
     times: np.ndarray
     blocks: dict[str, Block]
 
+    @property
+    def is_face(self) -> bool:
+        """Whether the fields are those of a face."""
+        return len(self.blocks) == 1
+
+
+def collect_frames(result, *, with_notes: bool = False) -> Frames:
+    """Compute the fields of a run in all frames.
+
+    Parameters
+    ----------
+    result : Result
+        Result of a run with a patch.
+    with_notes : bool
+        Whether notes on yielding are added to the result.
+    """
+    if result.patch.model.area is not None:
+        return Frames(Path(), result.fields["time"], make_face_blocks(result))
+    pieces = compute_pieces(result)
+    if with_notes:
+        add_yielding_notes(result, pieces)
+    return Frames(Path(), pieces.time, make_blocks(pieces))
+
 
 def write_fields(result, path: Path) -> None:
-    """Write the fields of both pieces and their interface of a run as a VTKHDF file, which ParaView reads.
+    """Write the fields of a run as a VTKHDF file, which ParaView reads.
 
     Parameters
     ----------
@@ -49,9 +74,8 @@ def write_fields(result, path: Path) -> None:
     path : Path
         File to write.
     """
-    pieces = compute_pieces(result)
-    add_yielding_notes(result, pieces)
-    write_blocks(path, make_blocks(pieces), pieces.time)
+    frames = collect_frames(result, with_notes=True)
+    write_blocks(path, frames.blocks, frames.times)
 
 
 def write_blocks(path: Path, blocks: dict[str, Block], times: np.ndarray) -> None:
@@ -184,11 +208,14 @@ def read_frames(path: Path, names: set[str] | None = None) -> Frames:
         with h5py.File(path, "r") as file:
             root = file["VTKHDF"]
             times = root["Steps/Values"][:]
-            for part, required in REQUIRED_FIELDS.items():
+            is_face = not REQUIRED_FACE_FIELDS - {*root["interface/CellData"]}
+            parts = ("interface",) if is_face else STORED_PARTS
+            for part in parts:
+                required = REQUIRED_FACE_FIELDS if is_face else REQUIRED_FIELDS[part]
                 missing = required - {*root[part]["PointData"], *root[part]["CellData"]}
                 if missing:
                     raise ValueError(f"{part} has no {', '.join(sorted(missing))}")
-            blocks = {part: _read_block(root[part], len(times), names) for part in STORED_PARTS}
+            blocks = {part: _read_block(root[part], len(times), names) for part in parts}
     except Exception as fault:  # a damaged file can raise exceptions of many classes
         reason = " ".join(str(fault).split())[:200] or type(fault).__name__
         raise PatchfemError(
