@@ -29,9 +29,7 @@ PUBLIC = {
         "BoundedSolution",
         "solve_bounded",
     ),
-    "cells": (
-        "make_block",
-    ),
+    "cells": ("make_block",),
     "contact_sets": ("ContactSets",),
     "edges": (
         "MIN_CONTACT_PRESSURE_RATIO",

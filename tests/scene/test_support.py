@@ -91,6 +91,7 @@ MORE_SETS = {
     "mode with yaw, bands that slip together, partial slip": f"{BONDS} {{patch}}.area.cells=64",
     "wear, mode with yaw, partial slip": "{law}.law=coulomb {patch}.area.cells=64",
     "shape on the lower piece, interface": BONDS,
+    "law for one interface, several interfaces": f"{BONDS} {{law}}.order=2",
     "mode with yaw, patch.area, rig, law for one interface": f"{BONDS} {{law}}.order=2",
 }
 REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
