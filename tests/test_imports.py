@@ -40,7 +40,7 @@ def write_scene(tmp_path):
 
 PHYSICS = set(
     "closed_forms compiled contact elasticity friction hybrid identify inputs mesh points response slip structure surface "
-    "wear".split()
+    "time_steps wear".split()
 )
 PIECES = "contact elasticity mesh "  # folders needed to solve a static patch
 MOTION = "compiled hybrid response structure "  # folders needed to integrate the motion of a rig
@@ -56,9 +56,9 @@ FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run`
     "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + MOTION + "friction"),
     "rig of a patch with slip": (
         COATED + SHEAR + PLASTIC + STRUCTURE,
-        PIECES + MOTION + "friction points slip",
+        PIECES + MOTION + "friction slip",
     ),
-    "wear": (COATED + COULOMB + TRIANGLE + WEAR, PIECES + BENCH_FOLDERS + "wear"),
+    "wear": (COATED + COULOMB + TRIANGLE + WEAR, PIECES + BENCH_FOLDERS + "time_steps wear"),
 }
 
 
@@ -94,7 +94,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         "hybrid.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.drives "
         "hybrid.free_motions hybrid.continuation hybrid.periodic_curves "
-        "points.time_march runs.rig.steady " + " ".join(RIG_KEYS),
+        "time_steps runs.rig.steady " + " ".join(RIG_KEYS),
     ),
     **{
         name: (COULOMB_RIG + lines, module, " ".join(RIG_KEYS - {module}))

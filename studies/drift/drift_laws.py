@@ -13,8 +13,8 @@ import today
 
 from patchfem.friction import Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
-from patchfem.points.contacts import BondSum, Contact, PointSet, make_pressed_contact
-from patchfem.points.laws import make_jenkins
+from patchfem.time_steps import laws
+from patchfem.time_steps.contacts import BondSum, Contact, PointSet
 
 LENGTH = ladder.LENGTH  # [m] bond length
 PERIOD = 1 / ladder.HERTZ  # [s] duration of a cycle
@@ -34,13 +34,15 @@ def make_bonds(law: Bonds):
     """Return the function of a load that makes a point of bonds."""
     is_first_order = law.reading == "stretch" and law.order == 1
     bond_sum = None if is_first_order else BondSum(law, cutoff_age(law.order, CUT_OFF), 0.0)
-    return lambda load: make_pressed_contact(law, 1.0, np.zeros(0), None, bond_sum, load=load)
+    points = laws.make_bonds(law, 1.0) if is_first_order else laws.make_list(law, 1.0)
+    point_sets = [PointSet(points, np.zeros(0))]
+    return lambda load: Contact(point_sets, law.static, law.length, load=load, bond_sum=bond_sum)
 
 
 def make_springs(stiffness, yield_slide):
     """Return the function of a load that makes parallel elastic-plastic elements, with forces (t,) per load [1]."""
     limits = np.multiply(stiffness, yield_slide)
-    points = PointSet(make_jenkins(limits, np.array(yield_slide, float)), np.zeros(0))
+    points = PointSet(laws.make_cells(limits, np.array(yield_slide, float), 1.0), np.zeros(0))
     return lambda load: Contact([points], float(limits.sum()), load=load)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from patchfem.points import follow
+from patchfem.time_steps import follow
 
 
 class OutOfReach(ArithmeticError):

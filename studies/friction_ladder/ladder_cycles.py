@@ -14,9 +14,9 @@ import today
 
 from patchfem.friction import Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
-from patchfem.points.contacts import BondSum, Contact, PointSet, make_bond_contact
-from patchfem.points.laws import make_jenkins
-from patchfem.points.slides import follow
+from patchfem.time_steps.contacts import BondSum, Contact, PointSet
+from patchfem.time_steps.laws import make_bonds, make_cells, make_list
+from patchfem.time_steps.slides import follow
 
 HERTZ = 143.0  # [Hz] frequency of the loops
 LENGTH = 2e-6  # [m] bond length
@@ -65,7 +65,7 @@ def bonds(share: float = 1.0, **more) -> Bonds:
 
 def points(law: Bonds) -> Contact:
     """Return a point of a law under 1 N."""
-    return make_bond_contact(law, 1.0, np.ones(1))
+    return Contact([PointSet(make_bonds(law, 1.0), np.ones(1))], law.static, law.length)
 
 
 def at_once() -> Bonds:
@@ -94,7 +94,8 @@ def printed_law_cycle(amplitude: float, order: float, steps: int, **growth) -> C
     """
     law = bonds(order=order, reading="report", **growth)
     bond_sum = BondSum(law, cutoff_age(order, 1e-5), 0.01)
-    contact = make_bond_contact(law, 1.0, np.ones(1), bond_sum=bond_sum)
+    points = PointSet(make_list(law, 1.0), np.ones(1))
+    contact = Contact([points], law.static, law.length, bond_sum=bond_sum)
     return last_cycle(contact, amplitude, steps)
 
 
@@ -115,7 +116,7 @@ def coulomb(like: Cycle, limit: float = 1.0) -> Cycle:
 
 def make_sliders(limits, lengths) -> Contact:
     """Return parallel Jenkins elements of friction limits [N] that yield at given slides [m]."""
-    law = make_jenkins(np.array(limits, float), np.array(lengths, float))
+    law = make_cells(np.array(limits, float), np.array(lengths, float), 1.0)
     return Contact([PointSet(law, np.ones(1))], float(np.sum(limits)), LENGTH)
 
 

@@ -12,14 +12,15 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import problems
 
 from patchfem.core import InitialState, ModalBasis
+from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.hybrid.cases import EXACT_RTOL
 from patchfem.hybrid.laws import masing
 from patchfem.model import build
-from patchfem.points import contacts, laws, time_march
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.joints import list_joints
 from patchfem.scene import scene
 from patchfem.structure import make_release
+from patchfem.time_steps import contacts, laws, time_march
 
 FOLDER = Path(__file__).parent
 POINTS = 20  # points per cycle at which relative displacements are compared
@@ -156,10 +157,11 @@ def hybrid(one: Problem, rtol: float) -> np.ndarray:
 def march(one: Problem, steps: int) -> np.ndarray:
     """Integrate by time stepping with `steps` per cycle."""
     if one.elements is None:
-        law = laws.make_coulomb(one.limit, one.limit)
+        law = laws.make_coulomb(Coulomb(one.limit, one.limit), np.ones(1))
     else:
         law = laws.make_elements(*one.elements)
-    contact = contacts.make_contact([law], one.modes.interfaces)
+    points = contacts.PointSet(law, one.modes.slide)
+    contact = contacts.Contact([points], one.limit)
     found = time_march.march(
         one.modes, one.drive, contact, one.cycles, steps, window=one.last, start=one.start
     )

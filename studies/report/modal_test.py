@@ -15,11 +15,11 @@ from scipy.optimize import least_squares
 import patchfem as pf
 from patchfem.hybrid import runs
 from patchfem.hybrid.cases import EXACT_RTOL, Schedule, make_rig_case
-from patchfem.points.time_march import march
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.contact_points import make_contact
 from patchfem.runs.rig.joints import make_joints
 from patchfem.structure.drives import RecordedDrive
+from patchfem.time_steps.time_march import march
 
 G = 9.80665  # [m/s^2] standard gravity
 RATE = 4000.0  # [1/s] rows of the record per second

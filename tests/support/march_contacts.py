@@ -14,12 +14,12 @@ from patchfem.time_steps.march_rows_kernels import LOWER
 
 def make_coulomb(static, kinetic, load=1.0):
     """Return a rigid point with coefficients of static and kinetic friction under a load [N]."""
-    return laws.make_coulomb(Coulomb(static, kinetic), np.atleast_1d(float(load)))
+    return laws.make_coulomb(Coulomb(static=static, kinetic=kinetic), np.atleast_1d(float(load)))
 
 
 def make_tanh(static, speed, load=1.0):
     """Return a point of the regularised law with a reference speed [m/s] under a load [N]."""
-    return laws.make_tanh(TanhLaw(static, speed), np.atleast_1d(float(load)))
+    return laws.make_tanh(TanhLaw(static=static, speed=speed), np.atleast_1d(float(load)))
 
 
 def make_contact(point_laws, rows, springs=(), scale=0.0, length=0.0) -> Contact:

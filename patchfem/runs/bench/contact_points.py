@@ -19,7 +19,6 @@ from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED
 from ...slip import shear_modes
 from ...time_steps import contacts, laws, systems
-from ...time_steps.march_rows_kernels import LOWER
 from ..patch import store
 from . import shear
 
@@ -357,7 +356,11 @@ def _make_point_set(surface: Surface, law, nodes=None, modes=None) -> contacts.P
     if modes is not None:
         x = x[modes.points]
         shares = shares[modes.points]
-    below = {"nodes": np.full(x.size, LOWER), "shares": shares, "places": x}
+    below = {
+        "nodes": np.full(x.size, time_steps.march_rows_kernels.LOWER),
+        "shares": shares,
+        "places": x,
+    }
     if surface.bond_sum is None:
         law = laws.keep_loads(law)
     return replace(point_set, law=law, **below)

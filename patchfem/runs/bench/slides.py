@@ -14,12 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import slip
+from ... import slip, time_steps
 from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import masing_loop
 from ...friction.record import make_law
-from ...time_steps import slides
 from ..patch import jenkins_elements
 from . import averaged_law, contact_points, masing, shear
 from .engine import (
@@ -97,7 +96,9 @@ class SlideTask(NamedTuple):
         """Return the normal load (k,) [N] at each sample."""
         if not has_changing_pressure(self.model):
             return np.full(self.slide.size, float(self.evaluate_pressure([0])[0] @ self.weight))
-        blocks = np.array_split(np.arange(self.slide.size), 1 + self.slide.size // slides.BLOCK)
+        blocks = np.array_split(
+            np.arange(self.slide.size), 1 + self.slide.size // time_steps.slides.BLOCK
+        )
         return np.concatenate([self.evaluate_pressure(block) @ self.weight for block in blocks])
 
 
@@ -382,7 +383,7 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
 
     # A long bond list is stopped by its guard before it takes too long.
     report = task.progress if contact.bond_sum is None else BondListGuard(task.progress)
-    motion = slides.follow(contact, time, task.slide, task.frames, task.say, report)
+    motion = time_steps.slides.follow(contact, time, task.slide, task.frames, task.say, report)
     if motion.n_unsolved:
         raise NotConverged(
             f"in {motion.n_unsolved} time steps of the prescribed slide the friction force has an error "

@@ -6,7 +6,7 @@ interface nodes by name.
 
 import numpy as np
 
-from ... import friction, slip, time_steps
+from ... import friction, slip
 from ...effects import law_has_trait, needs_bond_list
 from ..bench import averaged_law
 from ..bench import shear as bench_shear
@@ -56,7 +56,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
 
     # The points of a march are nodes of the patch, unless parallel elements replace them.
     has_shear = bool(snapshots) and model.partial_slip
-    is_march = bool(snapshots) and isinstance(snapshots[0], time_steps.time_march.Snapshot)
+    is_march = bool(snapshots) and numerics.engine == "march"
     has_nodes = False
     if is_march and snapshots[0].forces.size > 1:
         is_below = model.side == "lower" and model.grooves is None and not needs_bond_list(f)
