@@ -86,9 +86,12 @@ def test_exact_scene_key_selects_engine(tmp_path):
         assert engine_used == engine or engine == "auto"
 
 
-def test_refuses_scene_with_unsuitable_engine(tmp_path):
-    """A scene that requests the recursion for a law of another form is refused."""
-    with pytest.raises(
-        scene.SceneError, match=r"accuracy\.quadrature: 'recursion' with friction\.reading"
-    ):
-        load_rig_scene(tmp_path, "recursion")
+def test_unsuitable_engine_is_not_used(tmp_path):
+    """A scene that requests the recursion for a law of another form has a remark and the sum of its law."""
+    loaded = load_rig_scene(tmp_path, "recursion")
+    (remark,) = loaded.remarks
+    assert remark == (
+        "accuracy.quadrature is not used, because a recursion needs reading 'stretch' and order 1"
+    )
+    model = build(loaded)
+    assert choose_bond_summation(model, settings_of(model)).engine != "recursion"
