@@ -201,13 +201,8 @@ def refuse_slow_list(seconds: float, limit: float) -> None:
 
 
 def uses_parallel_elements(model) -> bool:
-    """Return whether parallel elements compute a bench run, which they do exactly at a constant load.
-
-    A density of elements, as that of the Iwan model, is divided into cells and has their error.
-    """
+    """Return whether parallel elements compute a bench run, which they do exactly at a constant load."""
     friction = model.friction
-    if law_has_trait(friction.law, "cells"):
-        return False
     is_constant = model.grooves is None and not has_changing_pressure(model)
     is_known = law_supports(friction, "shear") or not model.partial_slip
     return is_constant and is_known and law_supports(friction, "pieces")
