@@ -22,8 +22,8 @@ from patchfem import compiled
 from patchfem.compiled import cache_files, portable
 from patchfem.disk import user_cache
 
-# A prescribed slide has the smallest time loop that contains a friction law.
-SCENE = POINT + PLASTIC + TRIANGLE
+# A prescribed slide has the smallest time loop that contains a friction law; an oscillating load needs this loop.
+SCENE = POINT + 'amplitude = "1 N"\nfrequency = "50 Hz"\n' + PLASTIC + TRIANGLE
 BENCH = """\
 import gc, json, lzma, sys
 import patchfem.runs.run as simulate
@@ -373,7 +373,7 @@ def test_always_generated_module_needs_no_file(code_folder):
 
 def test_always_instance_of_kernels_is_kept():
     """Runs with the same parts share one kernel module: a module of its own would keep 1 MB in each run of a sweep."""
-    parts = {"lists": "points.no_lists_kernels"}
-    first = compiled.instantiate("points.march_kernels", parts)
-    assert compiled.instantiate("points.march_kernels", parts) is first
-    assert compiled.instantiate("points.march_kernels", {}) is not first
+    parts = {"lists": "time_steps.no_lists_kernels"}
+    first = compiled.instantiate("time_steps.march_kernels", parts)
+    assert compiled.instantiate("time_steps.march_kernels", parts) is first
+    assert compiled.instantiate("time_steps.march_kernels", {}) is not first
