@@ -22,17 +22,13 @@ PUBLIC = {
     "asperity_laws": (
         "ExponentialAsperities",
         "HertzAsperities",
-        "LinearAsperities",
     ),
     "bounded": (
         "BoundedProblem",
         "BoundedSolution",
         "solve_bounded",
     ),
-    "cells": (
-        "BlockCompliance",
-        "make_block",
-    ),
+    "cells": ("make_block",),
     "contact_sets": ("ContactSets",),
     "edges": (
         "MIN_CONTACT_PRESSURE_RATIO",
@@ -73,10 +69,7 @@ PUBLIC = {
         "make_set_arrays",
         "hash_set",
     ),
-    "set_table": (
-        "SetTable",
-        "solve_set",
-    ),
+    "set_table": ("SetTable",),
     "stiffness": ("tangential_stiffness",),
     "unilateral": ("INDEFINITE_COMPLIANCE_MESSAGE",),
 }
