@@ -22,7 +22,6 @@ PUBLIC = {
     "asperity_laws": (
         "ExponentialAsperities",
         "HertzAsperities",
-        "LinearAsperities",
     ),
     "bounded": (
         "BoundedProblem",
@@ -70,10 +69,7 @@ PUBLIC = {
         "make_set_arrays",
         "hash_set",
     ),
-    "set_table": (
-        "SetTable",
-        "solve_set",
-    ),
+    "set_table": ("SetTable",),
     "stiffness": ("tangential_stiffness",),
     "unilateral": ("INDEFINITE_COMPLIANCE_MESSAGE",),
 }

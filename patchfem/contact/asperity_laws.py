@@ -1,11 +1,10 @@
-"""Pressure laws of the compliant layer of asperities between rough surfaces.
+"""Smooth pressure laws of the compliant layer of asperities between rough surfaces.
 
-The pressure P >= 0 decreases with the separation s of the mean planes. The linear law carries nothing beyond s = 0. The
-smooth laws have P > 0 at every s; they are computed by the logarithm of P, which neither overflows nor vanishes.
+The pressure P decreases with the separation s of the mean planes and is positive at every s. It is computed by its
+logarithm, which neither overflows nor vanishes.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -13,36 +12,13 @@ import numpy as np
 TRAPEZOID_NODES = 0.1 * np.arange(1, 70)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class LinearAsperities:
-    """Linear law of the asperity layer: P = k max(0, -s), k [Pa/m] > 0.
-
-    -s > 0 is the compression of the layer; at s >= 0 it carries nothing.
-    """
-
-    is_smooth: ClassVar[bool] = False
-    k: float
-
-    def pressure(self, s: np.ndarray) -> np.ndarray:
-        """Pressure P = k max(0, -s) (m,) [Pa] at the separations s (m,) [m]."""
-        return self.k * np.maximum(0.0, -np.asarray(s, float))
-
-    def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """Stiffness -dP/ds (m,) [Pa/m] at the separations s (m,) [m], or 0 where the layer is not compressed."""
-        return np.where(np.asarray(s) < 0, self.k, 0.0)
-
-
 class SmoothAsperities:
     """Base class of pressure laws that are positive and smooth at every separation.
 
     Each law has `log_pressure` and `separation`.
-
-    `needs_load` tells whether a law must be given the mean pressure of a load before it can be evaluated.
     """
 
     __slots__ = ()
-    is_smooth: ClassVar[bool] = True
-    needs_load: ClassVar[bool] = False
 
     def pressure(self, s: np.ndarray) -> np.ndarray:
         """Return the pressure P (m,) [Pa] at the separations s (m,) [m].
@@ -60,18 +36,12 @@ class SmoothAsperities:
 class ExponentialAsperities(SmoothAsperities):
     """Exponential law of the asperity layer: P = reference exp(-s/u0) at the separation s [m] of the mean planes.
 
-    u0 [m] > 0 is the decay length, reference [Pa] the pressure at s = 0. Without a reference `press.press_patch`
-    takes the mean pressure of the given load. Flat aligned pieces then have s = 0, and the approach is the closing of
-    the bodies alone. The choice shifts the approach and nothing else.
+    u0 [m] > 0 is the decay length, reference [Pa] the pressure at s = 0, which shifts the approach and nothing else. If it
+    is the mean pressure, flat aligned pieces have s = 0, and the approach is the closing of the bodies alone.
     """
 
     u0: float
-    reference: float | None = None
-
-    @property
-    def needs_load(self) -> bool:
-        """Whether the pressure at s = 0 is the mean pressure of a load."""
-        return self.reference is None
+    reference: float
 
     def log_pressure(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return log P (m,) and its decay rate (m,) [1/m] at separations s (m,) [m]."""

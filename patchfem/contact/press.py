@@ -4,11 +4,10 @@ The motion q = (delta, -theta) of the holder, or as much of it as is free, close
 
 Asperities form a compliant layer with the local law P(s) in series with the pieces: a node of area A_i carries
 f_i = A_i P(s_i) at the separation s_i = g_i + theta x_i - delta + (C f)_i of the mean planes. P >= 0 decreases with s,
-so the solution is unique for every law, gap and control. A linear law adds 1/(k A_i) to the diagonal of C, and bare
-contact follows (`unilateral.solve`); `asperity_layer` solves the other laws.
+so the solution is unique for every law, gap and control. A linear law, which carries nothing beyond s = 0, adds 1/(k A_i)
+to the diagonal of C and is solved like bare pieces (`unilateral.solve`); `asperity_layer` solves the smooth laws.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -51,7 +50,7 @@ def press_patch(
     pieces: Compliance,
     gap: np.ndarray,
     holder: Holders,
-    asperities: "asperity_laws.LinearAsperities | asperity_laws.SmoothAsperities | None" = None,
+    asperities: "asperity_laws.SmoothAsperities | None" = None,
     start: np.ndarray | None = None,
 ) -> PatchState:
     """Solve the contact of a patch that a holder presses.
@@ -62,13 +61,13 @@ def press_patch(
     Parameters
     ----------
     pieces : Compliance
-        Compliance of the pieces at the m nodes, without asperities; that of rigid pieces, 0, needs asperities.
+        Compliance of the pieces at the m nodes, with a linear layer of asperities; that of rigid pieces, 0, needs a law.
     gap : (m,) ndarray
         Gap [m] with the prescribed rotation.
     holder : Holders
         Loads and prescribed motions, as numbers.
-    asperities : LinearAsperities, ExponentialAsperities or HertzAsperities, optional
-        Pressure law of the asperities; None if the pieces are bare.
+    asperities : ExponentialAsperities or HertzAsperities, optional
+        Smooth pressure law of the asperities.
     start : (m,) bool ndarray, optional
         Nodes in contact of a similar state, from which the search for the contact set starts.
 
@@ -84,29 +83,24 @@ def press_patch(
     NotConverged
         If a residual exceeds 1e-12, with a smooth asperity law 1e-9.
     """
-    is_smooth = asperities is not None and asperities.is_smooth
     x = pieces.interface.x
     _refuse_unsolvable(x, gap, holder)
     touching = float(gap.min())
     if holder.load == 0:
         no_force = np.zeros(x.size)
-        return PatchState(no_force, gap - touching, touching, 0.0, no_force if is_smooth else None)
+        return PatchState(no_force, gap - touching, touching, 0.0, asperities and no_force)
 
     # A gap that is measured from a point near the contact loses no digits to a large offset.
-    reference = 0.0 if is_smooth else touching
+    reference = 0.0 if asperities else touching
     if np.isnan(holder.load):
         reference = holder.approach
     problem = make_problem(x, gap - reference, holder)
 
-    # A linear layer is a compliance in series with the pieces; smooth laws need Newton's method
     with use_one_blas_thread():
-        if is_smooth:
+        if asperities:
             state = _press_smooth_layer(pieces, problem, asperities)
         else:
-            compliance = pieces.normal
-            if asperities is not None:
-                compliance = compliance + np.diag(1 / (asperities.k * pieces.interface.weight))
-            state = _press_bare(compliance, problem, start)
+            state = _press_bare(pieces.normal, problem, start)
     return state._replace(approach=float(reference + state.approach))
 
 
@@ -129,10 +123,7 @@ def _press_smooth_layer(pieces: Compliance, problem: ContactProblem, asperities)
     """
     from . import asperity_layer
 
-    # An exponential law without a reference takes the mean pressure of the load (`ExponentialAsperities`)
     area = pieces.interface.weight
-    if asperities.needs_load:
-        asperities = replace(asperities, reference=problem.target[0] / area.sum())
     layer = asperity_layer.AsperityProblem(asperities, pieces.normal, area, problem)
     solution = asperity_layer.press_with_asperities(layer)
     residuals = asperity_layer.compute_law_residuals(layer, solution)
@@ -144,7 +135,7 @@ def _press_smooth_layer(pieces: Compliance, problem: ContactProblem, asperities)
 
 
 def _press_bare(compliance: np.ndarray, problem: ContactProblem, start) -> PatchState:
-    """Solve a patch that has no asperity layer, or a linear one that the compliance contains.
+    """Solve a patch without a smooth asperity layer.
 
     Parameters
     ----------

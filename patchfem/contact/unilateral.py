@@ -31,6 +31,8 @@ INDEFINITE_COMPLIANCE_MESSAGE = (
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
     "cells of contact.mesh"
 )
+# Number of bisections, after which the rest position of a rigid piece is known to 1e-30 of the steepest slope of the gap
+N_BISECTIONS = 100
 # Smallest total force [N] in a divisor; it keeps residuals of open pieces finite
 MIN_TOTAL_FORCE = 1e-200
 
@@ -204,55 +206,11 @@ def solve_on_table(
     return ContactSolution(force, motion)
 
 
-def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> float:
-    """Return the rotation [rad] at which a rigid piece is in equilibrium under load and moment.
-
-    The piece rests on the edge of the lower convex hull of the gap below the load line; against a spring it may rest
-    on one corner.
-
-    Parameters
-    ----------
-    x, gap : (m,) ndarray
-        Increasing positions and gap [m].
-    load, moment, spring : float
-        Load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
-
-    Returns
-    -------
-    float
-        Rotation that opens the gap at positive x [rad].
-    """
-    left_index = 0
-    right = x.size - 1
-    while left_index < right:
-        # Rotation at which the piece would rest on both nodes
-        theta = -(gap[right] - gap[left_index]) / (x[right] - x[left_index])
-        height = gap + theta * x
-        lowest = int(np.argmin(height))
-
-        # A node between them touches first. The side of it that the load line is on keeps the support.
-        if left_index < lowest < right and height[lowest] < min(height[left_index], height[right]):
-            imbalance = load * x[lowest] - moment - spring * theta
-            if imbalance == 0:
-                return float(theta)
-            if imbalance > 0:
-                right = lowest
-            else:
-                left_index = lowest
-        # Both nodes touch. Against a spring the moment may lift the piece off one of them.
-        elif spring > 0 and load * x[left_index] - moment - spring * theta > 0:
-            right = left_index
-        elif spring > 0 and load * x[right] - moment - spring * theta < 0:
-            left_index = right
-        else:
-            return float(theta)
-
-    # The piece rests on one node, and the spring balances the moment
-    return float((load * x[left_index] - moment) / spring)
-
-
 def find_rest_motion(problem: ContactProblem) -> np.ndarray:
-    """Return approach [m] and rotation [rad] q (r,) at which a rigid piece rests on the other one.
+    """Return about the approach [m] and rotation [rad] q (r,) at which a rigid piece rests on the other one.
+
+    The node that touches first moves towards +x as the rotation grows, and with it the moment of the load. Bisection finds
+    the rotation at which load and spring balance the prescribed moment.
 
     `problem` has the gap of the nodes and the loads; without a load r is 0.
     """
@@ -260,8 +218,21 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
     gap = problem.gap
     if motion.size > 1:
         load, moment = problem.target
+        spring = problem.springs[1]
         position = problem.motions[:, 1]
-        motion[1] = -find_rest_rotation(position, gap, load, moment, problem.springs[1])
+
+        # Beyond the steepest slope of the gap the piece rests on an end, which only a spring allows
+        high = np.ptp(gap) / np.diff(position).min()
+        if spring > 0:
+            high += (load * np.abs(position).max() + abs(moment)) / spring
+        low = -high
+        for _ in range(N_BISECTIONS):
+            motion[1] = (low + high) / 2
+            node = np.argmin(gap - motion[1] * position)
+            if load * position[node] + spring * motion[1] > moment:
+                high = motion[1]
+            else:
+                low = motion[1]
         gap = gap - motion[1] * position
     motion[:1] = gap.min()
     return motion

@@ -9,7 +9,13 @@ from patchfem.core import Compliance, Interface
 
 
 def press_layer(c, x, weight, gap, asperities=None, load=np.nan, **holder):
-    """Return the state of a patch with a compliance (m, m) [m/N] that one of the `Holders` presses."""
+    """Return the state of a patch with a compliance (m, m) [m/N] that one of the `Holders` presses.
+
+    `asperities` is a smooth law, or the stiffness [Pa/m] of a linear one.
+    """
+    if isinstance(asperities, float):
+        c = c + np.diag(1 / (asperities * weight))
+        asperities = None
     pieces = Compliance(Interface(x, np.asarray(weight), 1.0), c, c)
     return press_patch(pieces, gap, Holders(load, **holder), asperities)
 

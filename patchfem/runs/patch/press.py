@@ -67,12 +67,14 @@ class Level:
 
     - model: PatchModel of the group; its load and the numbers of its gap shapes do not matter.
     - pair: condensed pieces.
-    - shapes (p, m): gap shapes [m per unit amplitude]; none if the gap of a case is given by itself.
+    - shapes (p, m): gap shapes [m per unit amplitude].
+    - tangent (m,): compliance [m/N] of a smooth asperity layer that is linearised; else None.
     """
 
     model: PatchModel
     pair: CondensedPair
     shapes: np.ndarray
+    tangent: np.ndarray | None = None
 
     @property
     def x(self) -> np.ndarray:
@@ -96,27 +98,29 @@ class Level:
 
     @cached_property
     def linear_layer(self) -> np.ndarray | None:
-        """Compliance (m,) [m/N] of a linear asperity layer at the nodes; None without such a layer."""
-        if not self.has_layer or self.is_smooth:
-            return None
+        """Compliance (m,) [m/N] of a linear or linearised asperity layer at the nodes; None without such a layer."""
+        if self.tangent is not None or not self.has_layer or self.is_smooth:
+            return self.tangent
         return 1 / (self.model.interface.skin.normal_stiffness * self.area)
 
-    def add_layer(self, layer) -> tuple[np.ndarray, np.ndarray]:
-        """Return normal compliance (m, m) and shear compliance of the pieces with a layer (m,) [m/N], or None, in series.
+    def linearise(self, tangent: np.ndarray) -> "Level":
+        """Return the pieces with a smooth asperity layer of a tangent compliance (m,) [m/N], without gap shapes."""
+        return Level(self.model, self.pair, self.shapes[:0], tangent)
 
-        The shear compliance (b m, b m) of unlike pieces contains the normal one and the coupling of both (b = 2).
-        """
-        normal = self.pair.compliance.normal
-        tangential = self.pair.compliance.tangential
-        if layer is not None:
-            normal = normal + np.diag(layer)
-            ratio = self.model.interface.skin.tangential_ratio
-            if ratio is not None:
-                tangential = tangential + np.diag(layer / ratio)
-        closing = self.pair.closing
-        if closing.any():
-            tangential = np.block([[normal, closing], [closing.T, tangential]])
-        return normal, tangential
+    @cached_property
+    def pieces(self) -> Compliance:
+        """Pieces in series with a linear or linearised layer; without a tangential ratio the layer is rigid in shear."""
+        pieces = self.pair.compliance
+        layer = self.linear_layer
+        if layer is None:
+            return pieces
+        tangential = pieces.tangential
+        ratio = self.model.interface.skin.tangential_ratio
+        if ratio is not None:
+            tangential = frozen_array(tangential + np.diag(layer / ratio))
+        return Compliance(
+            pieces.interface, frozen_array(pieces.normal + np.diag(layer)), tangential
+        )
 
     @cached_property
     def motions(self) -> np.ndarray:
@@ -124,23 +128,22 @@ class Level:
         return np.stack([np.ones(self.x.size), self.x])
 
     @cached_property
-    def shear_column(self) -> np.ndarray:
-        """Displacement (1, b m) of a unit slide at fixed approach."""
-        column = np.ones((1, self.x.size))
-        return np.hstack([0 * column, column]) if self.pair.closing.any() else column
-
-    @cached_property
     def tables(self) -> tuple[SetTable, SetTable]:
         """Contact sets of the normal compliance, for all columns, and of the shear compliance, for a unit slide.
 
-        A smooth layer has none, because its compliance differs between the cases.
+        The shear compliance of unlike pieces contains the normal one and the coupling of both, and the slide is that at
+        fixed approach. A smooth layer has no tables, because its tangent differs between the cases (`linearise`).
         """
-        normal, shear = self.add_layer(self.linear_layer)
+        size = self.x.size
+        normal = self.pieces.normal
+        shear = self.pieces.tangential
+        slide = np.ones((1, size))
+        closing = self.pair.closing
+        if closing.any():
+            shear = np.block([[normal, closing], [closing.T, shear]])
+            slide = np.hstack([0 * slide, slide])
         columns = np.concatenate([self.motions, self.shapes])
-        return (
-            SetTable(normal, columns, self.x.size),
-            SetTable(shear, self.shear_column, self.x.size),
-        )
+        return SetTable(normal, columns, size), SetTable(shear, slide, size)
 
     def limit_sets(self, max_sets: int) -> None:
         """Discard the contact sets if there are more than `max_sets`, because many cases with own sets need much memory."""
@@ -438,8 +441,6 @@ def _make_patch(pressed: PressedCases) -> Patch:
     patch_model = pressed.level.model
     pair = pressed.level.pair
     loading = patch_model.loading
-    interface = patch_model.interface
-    skin = interface.skin
     load = float(pressed.load[0])
     contact_state = ContactState(
         frozen_array(pressed.contact_pressure[0]),
@@ -451,18 +452,12 @@ def _make_patch(pressed: PressedCases) -> Patch:
         Outcome.DONE if load > 0 else Outcome.NO_CONTACT,
     )
 
-    # The layer can be part of the compliance. Without a tangential ratio it is rigid in shear.
-    pieces = pair.compliance
-    layer_shear = 0.0
-    if skin is not None:
-        layer = np.diag(pressed.layer[0])
-        if skin.tangential_ratio is not None:
-            layer_shear = layer / skin.tangential_ratio
-        normal = frozen_array(pieces.normal + layer)
-        pieces = Compliance(pieces.interface, normal, frozen_array(pieces.tangential + layer_shear))
-
+    level = pressed.level
+    if level.is_smooth:
+        level = level.linearise(pressed.layer[0])
+    pieces = level.pieces
     slip_compliance = pieces.tangential
-    if not interface.has_shear:
+    if not patch_model.interface.has_shear:
         slip_compliance = slip_compliance - pair.compliance.tangential
     if loading.tangential_stiffness:
         slip_compliance = slip_compliance + 1 / loading.tangential_stiffness
@@ -535,7 +530,6 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
     The parameters and results are those of `press_on_level`.
     """
     holders = cases.holders
-    compliance = level.pair.compliance
     unloaded_gap = cases.amplitudes @ level.shapes
     force = np.zeros(unloaded_gap.shape)
     gap = unloaded_gap.copy()
@@ -564,8 +558,11 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
     errors = {}
     for case in alone:
         try:
-            law = make_skin_law(level.model) if level.has_layer else None
-            state = press_patch(compliance, unloaded_gap[case], holders.take(case), law)
+            holder = holders.take(case)
+            law = None
+            if level.is_smooth:
+                law = make_skin_law(level.model, holder.load / level.area.sum())
+            state = press_patch(level.pieces, unloaded_gap[case], holder, law)
         except PatchfemError as error:
             errors[int(case)] = error
             continue
@@ -591,10 +588,14 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
     PatchfemError
         If a profile does not fit the mesh.
     """
-    pieces = pair.compliance
-    gap = patch_model.gap.evaluate(pieces.interface.x).heights + pair.end_gap
+    x = pair.compliance.interface.x
+    gap = patch_model.gap.evaluate(x).heights + pair.end_gap
+    level = Level(patch_model, pair, np.zeros((0, x.size)))
+    pieces = level.pieces
     holder = make_cases(patch_model, 1).holders.take(0)
-    law = None if patch_model.interface.skin is None else make_skin_law(patch_model)
+    law = None
+    if level.is_smooth:
+        law = make_skin_law(patch_model, holder.load / level.area.sum())
     active = None
 
     def compute_forces(worn, softening) -> np.ndarray:

@@ -13,13 +13,13 @@ from ...formatting import format_length, format_quantity
 from ...model import peaks as traces
 
 
-def make_skin_law(patch_model):
-    """Return the law of pressure against separation of the asperity layer of a patch."""
+def make_skin_law(patch_model, pressure: float):
+    """Return the smooth law of pressure against separation of the asperity layer of a patch.
+
+    The separations of an exponential law without a stiffness are measured from that under the mean `pressure` [Pa].
+    """
     skin = patch_model.interface.skin
-    if skin.law == "linear":
-        return asperity_laws.LinearAsperities(skin.normal_stiffness)
     if skin.law == "exponential":
-        pressure = None
         if skin.normal_stiffness is not None:
             pressure = skin.normal_stiffness * skin.decay_length
         return asperity_laws.ExponentialAsperities(skin.decay_length, pressure)
@@ -33,12 +33,13 @@ def asperity_layer_stiffness(patch_model, pressure: float) -> float:
 
     It is 0 for a nonlinear law without pressure.
     """
-    if patch_model.interface.skin.law == "linear":
-        return patch_model.interface.skin.normal_stiffness
-    law = make_skin_law(patch_model)
-    if isinstance(law, asperity_laws.ExponentialAsperities):
-        return pressure / law.u0
-    return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
+    skin = patch_model.interface.skin
+    if skin.law == "linear":
+        return skin.normal_stiffness
+    if not pressure > 0:
+        return 0.0
+    law = make_skin_law(patch_model, pressure)
+    return float(law.stiffness(law.separation(np.array([pressure])))[0])
 
 
 def note_on_asperity_stiffness(patch_model, pressure: float) -> list[str]:

@@ -10,7 +10,6 @@ import numpy as np
 
 from ... import closed_forms
 from ...contact import edges
-from ...contact.set_table import solve_set
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grid import TensorGrid
 from ..results.patch_rows import Arrays, Values
@@ -313,29 +312,19 @@ def _compute_stiffnesses(pressed: PressedCases, contact_edges: edges.ContactEdge
     changes = np.zeros((2, 3, len(active), n_edges))
 
     # The compliance of a smooth layer is that of the linearised law at the pressure of each case
+    groups = [(slice(None), level)]
     if level.is_smooth:
-        for row, layer in enumerate(pressed.layer):
-            if not active[row].any():
-                continue
-            normal, shear = level.add_layer(layer)
-            for compliance, columns, rows in (
-                (normal, level.motions, slice(0, 2)),
-                (shear, level.shear_column, slice(2, 3)),
-            ):
-                solution = solve_set(compliance, active[row], columns)
-                work[rows, row] = (solution.force * columns).sum(axis=1)
-                own = len(solution.gain)
-                changes[0, rows, row, :own] = solution.gain.T
-                changes[1, rows, row, :own] = solution.loss.T
-    else:
-        table, shear_table = level.tables
-        slots = table.find_slots(active)
-        shear_slots = shear_table.find_slots(active)
+        rows = range(len(pressed))
+        groups = [(slice(row, row + 1), level.linearise(pressed.layer[row])) for row in rows]
+    for rows, part in groups:
+        table, shear_table = part.tables
+        slots = table.find_slots(active[rows])
+        shear_slots = shear_table.find_slots(active[rows])
         for number, (one, own, column) in enumerate(
             ((table, slots, 0), (table, slots, 1), (shear_table, shear_slots, 0))
         ):
-            work[number] = one.work[own, column, column]
-            changes[:, number] = one.end_changes(own, column, n_edges)
+            work[number, rows] = one.work[own, column, column]
+            changes[:, number, rows] = one.end_changes(own, column, n_edges)
 
     shift = np.where(contact_edges.exists, contact_edges.fraction - 0.5, 0.0)
     return work + edges.parabola_change(shift, *changes).sum(axis=-1)
