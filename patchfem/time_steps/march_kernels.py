@@ -74,8 +74,8 @@ TINY = 1e-150  # m, in place of no path; its square is not zero
 
 
 @njit(**NJIT_CALL)
-def slide_block(system, block, move, velocity, damping, step):
-    """Slide a block of points by an increment of their port; write forces and slopes.
+def place_block(system, block, move, velocity, step):
+    """Write the slides of a block of points and their velocities at the end for an increment of their port.
 
     Parameters
     ----------
@@ -84,13 +84,11 @@ def slide_block(system, block, move, velocity, damping, step):
     block : int
         Number of the block.
     move : float
-        Increment of the port [m].
+        Increment of the port, along the flank of a groove [m].
     velocity : float
         Velocity of the port at the end [m/s].
-    damping : float
-        Weight of the force at the end in the mean force.
     step : Step
-        Duration and formula of the velocity.
+        Formula of the velocity.
     """
     points = system.points
     values = points.values[block]
@@ -98,10 +96,14 @@ def slide_block(system, block, move, velocity, damping, step):
     n_lanes = count_lanes(points, block)
     start = points.first_shear[port]
     stop = points.first_shear[port + 1]
-
-    # The pieces take a part of the increment by shear.
     for j in range(n_lanes):
         values[Value.BENT + j] = 0.0
+        values[Value.SLIDE + j] = move
+        values[Value.VELOCITY + j] = velocity
+    if start == stop:
+        return
+
+    # The pieces take a part of the increment by shear.
     at = WIDTH * block
     for k in range(start, stop):
         shape = points.shapes[k]
@@ -109,43 +111,65 @@ def slide_block(system, block, move, velocity, damping, step):
         for j in range(n_lanes):
             values[Value.BENT + j] += shape[at + j] * increment
     for j in range(n_lanes):
-        bent = values[Value.BENT + j]
-        values[Value.SLIDE + j] = move - bent
-        values[Value.VELOCITY + j] = velocity
-    if start < stop:
-        for j in range(n_lanes):
-            last = values[Value.LAST_SLIDE + j]
-            velocity = step.rate * values[Value.SLIDE + j] - step.lag * last
-            values[Value.VELOCITY + j] = velocity
+        slide = move - values[Value.BENT + j]
+        values[Value.SLIDE + j] = slide
+        values[Value.VELOCITY + j] = step.rate * slide - step.lag * values[Value.LAST_SLIDE + j]
 
-    if points.law[block] == Law.LIST:
-        lists.slide_lists(system.lists, points.numbers[block], values, points.count[block], step)
+
+@njit(**NJIT_CALL)
+def slide_block(system, block, step):
+    """Write forces and slopes of a block of points at their slides and loads.
+
+    Parameters
+    ----------
+    system : march_rows_kernels.System
+        Arrays of the march; the block is changed.
+    block : int
+        Number of the block.
+    step : Step
+        Duration and formula of the velocity.
+    """
+    points = system.points
+    values = points.values[block]
+    numbers = points.numbers[block]
+    count = points.count[block]
+    law = points.law[block]
+    if law == Law.LIST:
+        lists.slide_lists(system.lists, numbers, values, count, step)
     else:
-        slide_points(
-            points.law[block],
-            points.numbers[block],
-            points.memory[block],
-            points.trial[block],
-            values,
-            points.count[block],
-            step,
-        )
+        slide_points(law, numbers, points.memory[block], points.trial[block], values, count, step)
 
-    # Mean force on the port: the path mean over the part that slides, the mean of both ends over the part of the pieces
+
+@njit(**NJIT_CALL)
+def weigh_block(points, block, damping, step):
+    """Write the mean forces of a block of points on their port, and the slopes of these forces.
+
+    Parameters
+    ----------
+    points : step_rows_kernels.Points
+        Points; the block is changed.
+    block : int
+        Number of the block.
+    damping : float
+        Weight of the force at the end in the mean force.
+    step : Step
+        Formula of the velocity.
+    """
+    values = points.values[block]
+    port = points.port[block]
+    n_lanes = count_lanes(points, block)
     rest = 1 - damping
-    if start == stop:
+    if points.first_shear[port] == points.first_shear[port + 1]:
         for j in range(n_lanes):
-            values[Value.FORCE + j] = (
-                damping * values[Value.END + j] + rest * values[Value.MEAN + j]
-            )
-            values[Value.BY_SLIDE + j] = (
-                damping * values[Value.END_BY_SLIDE + j] + rest * values[Value.MEAN_BY_SLIDE + j]
-            )
-            values[Value.BY_VELOCITY + j] = (
-                damping * values[Value.END_BY_VELOCITY + j]
-                + rest * values[Value.MEAN_BY_VELOCITY + j]
-            )
+            end = damping * values[Value.END + j]
+            values[Value.FORCE + j] = end + rest * values[Value.MEAN + j]
+            end = damping * values[Value.END_BY_SLIDE + j]
+            values[Value.BY_SLIDE + j] = end + rest * values[Value.MEAN_BY_SLIDE + j]
+            end = damping * values[Value.END_BY_VELOCITY + j]
+            values[Value.BY_VELOCITY + j] = end + rest * values[Value.MEAN_BY_VELOCITY + j]
         return
+
+    # Behind pieces it is the path mean over the part that slides, and the mean of both ends over the part of the pieces.
     for j in range(n_lanes):
         slide = values[Value.SLIDE + j]
         bent = values[Value.BENT + j]
@@ -153,34 +177,64 @@ def slide_block(system, block, move, velocity, damping, step):
         part = abs(bent) / path
         half = 0.5 * (values[Value.START + j] + values[Value.END + j])
         mean = values[Value.MEAN + j]
+        force = damping * values[Value.END + j] + rest * mean + rest * part * (half - mean)
+        values[Value.FORCE + j] = force
+
+        # Slopes by the increment of the port and by the part of the pieces; `more` is that of `part`
         more = rest * (half - mean) / (path * path)
-        by_mean = rest * (1 - part)
-        by_end = damping + 0.5 * rest * part
         slide_sign = 1.0 if slide > 0 else -1.0
         bent_sign = 1.0 if bent > 0 else -1.0
         end_slope = values[Value.END_BY_SLIDE + j] + step.rate * values[Value.END_BY_VELOCITY + j]
-        mean_slope = values[Value.MEAN_BY_SLIDE + j]
-        mean_slope += step.rate * values[Value.MEAN_BY_VELOCITY + j]
-        values[Value.FORCE + j] = (
-            damping * values[Value.END + j] + rest * mean + rest * part * (half - mean)
-        )
-        values[Value.BY_SLIDE + j] = (
-            by_mean * mean_slope + by_end * end_slope - more * abs(bent) * slide_sign
+        slope = values[Value.MEAN_BY_SLIDE + j] + step.rate * values[Value.MEAN_BY_VELOCITY + j]
+        slope = rest * (1 - part) * slope + (damping + 0.5 * rest * part) * end_slope
+        values[Value.BY_SLIDE + j] = slope - more * abs(bent) * slide_sign
+        values[Value.BY_SHEAR + j] = (
+            more * (bent_sign * abs(slide) + slide_sign * abs(bent)) - slope
         )
         values[Value.BY_VELOCITY + j] = 0.0
-        values[Value.BY_SHEAR + j] = (
-            more * (bent_sign * abs(slide) + slide_sign * abs(bent))
-            - by_mean * mean_slope
-            - by_end * end_slope
-        )
+
+
+@njit(**NJIT_CALL)
+def place_points(system, level, step):
+    """Write increments and velocities of ports and points under the assumed forces and shear increments.
+
+    Parameters
+    ----------
+    system : march_rows_kernels.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    step : Step
+        Duration and formula of the velocity.
+    """
+    points = system.points
+    flank = system.flank
+    moves = system.ports.values
+    move_ports(system, level)
+    for p in range(moves.shape[1]):
+        dq = moves[Port.INCREMENT, p]
+        damping = moves[Port.DAMPING, p]
+        if damping > 0.0:
+            dq = (1 - damping) * dq + damping * step.duration * moves[Port.END_VELOCITY, p]
+        moves[Port.MOVE, p] = dq
+    if flank.size:
+        flanks.climb(flank, moves[Port.SLIDE, 0], moves[Port.MOVE, 0], step.duration)
+
+    # The points of a groove slide along its flank.
+    for p in range(moves.shape[1]):
+        ratio = flank[Flank.RATIO] if flank.size and p == 0 else 1.0
+        move = ratio * moves[Port.MOVE, p]
+        velocity = ratio * moves[Port.END_VELOCITY, p]
+        for block in range(points.first[p], points.first[p + 1]):
+            place_block(system, block, move, velocity, step)
 
 
 @njit(**NJIT_CALL)
 def write_forces(system, level, step):
-    """Compute increments of ports and points under the assumed forces `Port.FORCE` and shear increments, and forces.
+    """Compute increments and forces of ports and points under the assumed forces `Port.FORCE` and shear increments.
 
-    Loads that follow from the motion are those of the increments of the ports. Where they follow from the forces or the
-    slides of points, they are those of the trial before.
+    Loads that follow from the motion are those of these increments. Where they follow from forces of points, they are those
+    of the trial before.
 
     Parameters
     ----------
@@ -196,29 +250,17 @@ def write_forces(system, level, step):
     float
         Change of the loads since the trial before, relative to the resultant; -1 without a contact set.
     """
-    ports = system.ports
     points = system.points
-    moves = ports.values
+    moves = system.ports.values
     flank = system.flank
-    n_ports = moves.shape[1]
-    move_ports(system, level)
-    for p in range(n_ports):
-        dq = moves[Port.INCREMENT, p]
-        damping = moves[Port.DAMPING, p]
-        if damping > 0.0:
-            dq = (1 - damping) * dq + damping * step.duration * moves[Port.END_VELOCITY, p]
-        moves[Port.MOVE, p] = dq
-    if flank.size:
-        flanks.climb(flank, moves[Port.SLIDE, 0], moves[Port.MOVE, 0], step.duration)
+    place_points(system, level, step)
     change = 0.0
-    if ports.contact[0] >= 0 or flank.size or points.pressure.size:
+    if system.ports.contact[0] >= 0 or flank.size or points.pressure.size:
         change = find_loads(system, 0, 0.0, True)
         if change < 0:
             return change
 
-    # The points of a groove slide along its flank.
-    for p in range(n_ports):
-        ratio = flank[Flank.RATIO] if flank.size and p == 0 else 1.0
+    for p in range(moves.shape[1]):
         force = 0.0
         by_slide = 0.0
         by_velocity = 0.0
@@ -226,10 +268,8 @@ def write_forces(system, level, step):
             if points.law[block] == Law.COULOMB:
                 force = slip_rigidly(system, p, block)
                 continue
-            velocity = ratio * moves[Port.END_VELOCITY, p]
-            slide_block(
-                system, block, ratio * moves[Port.MOVE, p], velocity, moves[Port.DAMPING, p], step
-            )
+            slide_block(system, block, step)
+            weigh_block(points, block, moves[Port.DAMPING, p], step)
             force += sum_points(points, block, Value.FORCE)
             by_slide += sum_points(points, block, Value.BY_SLIDE)
             by_velocity += sum_points(points, block, Value.BY_VELOCITY)
@@ -245,13 +285,13 @@ def write_forces(system, level, step):
         moves[Port.BY_VELOCITY, 0] *= flank[Flank.RATIO] ** 2
     if system.structure.path.size:
         moves[Port.FORCE, 0] = moves[Port.SUM, 0]
-    # Loads under heave and pitch are consistent with the increments of this trial.
-    return change if ports.contact[0] < 0 else 0.0
+    # Loads of nodes, and of places on the lower piece, are consistent with the slides of this trial.
+    return change if flank.size else 0.0
 
 
 @njit(**NJIT_CALL)
 def slip_rigidly(system, p, block):
-    """Return the friction [N] of the rigid point of port p, 0 for a port at rest; write its slide.
+    """Return the friction [N] of the rigid point of port p, 0 for a port at rest.
 
     Parameters
     ----------
@@ -264,10 +304,8 @@ def slip_rigidly(system, p, block):
     """
     points = system.points
     values = points.values[block]
-    increment = system.ports.values[Port.INCREMENT, p]
-    values[Value.SLIDE] = increment
     if system.structure.path.size:
-        points.trial[block, 0] = np.sign(increment)
+        points.trial[block, 0] = np.sign(system.ports.values[Port.INCREMENT, p])
     load = 0.5 * (values[Value.START_LOAD] + values[Value.END_LOAD])
     values[Value.FORCE] = points.trial[block, 0] * points.numbers[block, WIDTH] * load
     return values[Value.FORCE]
