@@ -185,4 +185,5 @@ def test_exact_iwan_loop_agrees_with_closed_form(chi, beta, amplitude):
     ):
         difference = abs(measures[name].value - exact)
         assert difference <= 1e-9 * abs(exact), name
-        assert 0 < measures[name].error < 1e-8 * abs(exact), name
+        # A smooth peak between two samples is part of the error of a peak.
+        assert 0 < measures[name].error < 1e-7 * abs(exact), name

@@ -61,7 +61,10 @@ def test_exact_rising_load_adds_unstressed_springs():
     # the added springs double the stiffness
     assert run.mean[-1] == pytest.approx(0.8 + 0.1)
 
-    # elastic over 0.1 up to the limit, then slip over three lengths
-    slip_path = march_under_loads(UNIT_LAW, [0.0, 0.8, 0.8, 0.8, 3.9], [1.0, 1.0, 2.0, 1.0, 1.0])
-    assert slip_path.stored[-1] == pytest.approx(1 / (2 * (1 + np.exp(-3.0))))
-    assert slip_path.dissipated[-1] == pytest.approx(3.0 + 0.09 + 0.8**2 / 4 - slip_path.stored[-1])
+    # elastic over 0.1 up to the limit, then slip over three lengths, in which springs break with order two in the steps
+    path = [0.0, 0.8, 0.8, 0.8, *np.linspace(0.9, 3.9, 3001)]
+    slip_path = march_under_loads(UNIT_LAW, path, [1.0, 1.0, 2.0, *np.ones(len(path) - 3)])
+    stored = slip_path.stored[-1]
+    assert stored == pytest.approx(1 / (2 * (1 + np.exp(-3.0))), rel=1e-6)
+    dissipated = slip_path.dissipated[-3001:].sum()
+    assert dissipated == pytest.approx(3.0 + 0.09 + 0.8**2 / 4 - stored, rel=1e-6)
