@@ -695,8 +695,14 @@ def find_event(system, level, drive):
 
 @njit(**NJIT_CALL)
 def find_creep(system, block):
-    """Return the largest velocity [m/s] of the rigid point of a block at which its port may be at rest."""
+    """Return the largest velocity [m/s] of the rigid point of a block at which its port may be at rest.
+
+    Only ports that share their force with others creep. Any other port would rest again after a release, because a
+    shortest step of a fine march gives it a smaller velocity.
+    """
     p = system.points.port[block]
+    if system.ports.redundant[p] == 0:
+        return 0.0
     force = abs(system.points.values[block, Value.FORCE])
     return CREEP * system.ports.compliance[0, 1, p, p] * force
 

@@ -192,7 +192,7 @@ ITEMS = (
         "the nonlocal law on pieces that deform in shear",
         RIG,
         "studies/rig/readings.py",
-        "tests/points/test_march_bonds.py",
+        "tests/time_steps/test_march_bonds.py",
         "works",
     ),
     Item(
@@ -200,7 +200,7 @@ ITEMS = (
         "the law uses the normal stress at the place where a bond formed",
         LOOP,
         "",
-        "tests/points/test_march_bonds.py",
+        "tests/time_steps/test_march_bonds.py",
         "works",
     ),
     Item(

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from pieces import COATED, COATING, HEIGHT, LENGTH, WIDTH, make_bare_layers
 
-from patchfem.contact import solve_set, tangential_stiffness
+from patchfem.contact import tangential_stiffness
+from patchfem.contact.set_table import solve_set
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import Piece, compute_interface_compliance
 from patchfem.mesh import make_graded_grid
