@@ -126,6 +126,18 @@ class Model:
         return has_law and not is_partial
 
     @property
+    def motion_depends_on_mesh(self) -> bool:
+        """Whether the motion follows from the pressure at each place of the patch, and so has an error due to its mesh."""
+        friction = None if self.rig is None else self.rig.friction
+        moves = friction is not None and (friction.load_varies or friction.bands_slide_apart)
+        return bool(self.partial_slip or moves or self.side == "lower")
+
+    @property
+    def has_irregular_edges(self) -> bool:
+        """Whether edges of contact follow sides of cells, or points pass them, so that errors of a mesh are irregular."""
+        return self.side == "lower" or (self.patch is not None and self.patch.area is not None)
+
+    @property
     def has_interface_patches(self) -> bool:
         """Whether at least one interface of the rig has a patch."""
         if self.rig is None:

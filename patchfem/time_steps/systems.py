@@ -260,12 +260,16 @@ def find_stiffness(point_set) -> float:
     law = point_set.law
     if point_set.shear is None:
         return float(law.stiffness.sum())
-    # 1^T (D^-1 + S K^-1 S^T)^-1 1 for the stiffnesses D of the points and K of the coordinates of shapes S
+    # The energy of a unit slide, 1/2 (1 - S y)^T D (1 - S y) + 1/2 y^T K y, is least at coordinates y of the shear, for
+    # stiffnesses D of the points, K of the coordinates, and shapes S. There it has no error of first order in y.
     is_stiff = law.stiffness > 0
     shape = np.asarray(point_set.shear.shape)[is_stiff]
-    compliance = np.diag(1 / law.stiffness[is_stiff])
-    compliance += (shape / point_set.shear.stiffness) @ shape.T
-    return float(np.linalg.solve(compliance, np.ones(len(shape))).sum())
+    own = law.stiffness[is_stiff]
+    weighted = own[:, None] * shape
+    y = np.linalg.solve(
+        np.diag(point_set.shear.stiffness) + shape.T @ weighted, weighted.sum(axis=0)
+    )
+    return float(own @ (1 - shape @ y) ** 2 + point_set.shear.stiffness @ y**2)
 
 
 def _make_port_values(contact, n_ports: int) -> np.ndarray:

@@ -144,3 +144,39 @@ def test_exact_no_common_period_gives_no_steady_amplitude(frequency, cycles, tmp
     result.save(tmp_path)
     verdict = read_json(tmp_path / "summary.json")["verdict"]
     assert f"Whether the motion is steady is unknown: {reason}" in str(verdict)
+
+
+LOWER = """[contact]
+length = "2.3 mm"
+width = "11.5 mm"
+height = "1 mm"
+load = "194 N"
+substrate = "steel"
+crown = {radius = "2.34 m", on = "lower"}
+[friction]
+static = 0.6
+law = "elastic-plastic"
+stiffness = "5.45e6 N/m"
+[structure]
+moving_mass = "1.34 kg"
+[[structure.mode]]
+name = "a"
+frequency = "163 Hz"
+damping = 0.014
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "125 Hz"
+acceleration = "11 g"
+cycles = 6
+"""
+
+
+def test_error_over_the_lower_piece_includes_the_mesh():
+    """The points of the upper piece pass the edges of contact, whose place on a mesh of 25 um has an error of .1 %."""
+    steps = "accuracy.steps_per_cycle=800; contact.element_size={} um"
+    coarse, fine = (run_scene(LOWER, steps.format(size)).measures for size in (25, 6.25))
+    for name in (AMPLITUDE, "loop_area", "absolute_acceleration_fundamental"):
+        assert coarse[name].error > abs(coarse[name].value - fine[name].value) / 2, name
+        assert coarse[name].error < 0.1 * coarse[name].value, name
+    assert coarse[AMPLITUDE].error > 1e-4 * coarse[AMPLITUDE].value

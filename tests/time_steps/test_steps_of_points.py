@@ -14,7 +14,7 @@ from patchfem.friction.laws.lugre import LuGre
 from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.motion_measures import energy_balance
 from patchfem.slip import shear_modes
-from patchfem.time_steps import follow, laws, march
+from patchfem.time_steps import find_stiffness, follow, laws, march
 from patchfem.time_steps.contacts import Contact, PointSet
 
 LOADS = np.array([3.0, 8.0, 14.0, 12.0, 7.0, 2.0])  # N
@@ -70,6 +70,15 @@ def test_exact_partial_slip_in_one_step():
             assert motion.force[-1] == pytest.approx(force, rel=1e-9)
         one = follow(contact, [0.0, 1.0], [0.0, slide]).force[-1]
         assert one == pytest.approx(motion.force[-1], rel=1e-9)
+
+
+def test_exact_stiffness_behind_pieces_is_that_of_a_small_slide():
+    """Points at rest behind elastic pieces have the compliance of points and pieces in series."""
+    points = make_points("elastic-plastic", np.zeros(0))
+    shape = np.asarray(points.shear.shape)
+    compliance = np.diag(1 / points.law.stiffness) + (shape / points.shear.stiffness) @ shape.T
+    expected = np.linalg.solve(compliance, np.ones(LOADS.size)).sum()
+    assert find_stiffness(points) == pytest.approx(expected, rel=1e-11)
 
 
 def test_tanh_behind_pieces_agrees_with_ode():

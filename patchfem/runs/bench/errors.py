@@ -140,13 +140,14 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
         )
         reference = quarter._replace(steps=steps_on_coarse_mesh)
         runs = tuple(reference._replace(level=level) for level in range(1, len(patches)))
-        rule = convergence_errors if patches[0].model.area is None else face_errors
+        rule = face_errors if model.has_irregular_edges else convergence_errors
         out.append(CoarserRuns(runs, rule, reference, "mesh"))
     elif has_coarser_mesh:
         # Both runs have the same number of modes, so that only the mesh changes.
         count = fine_run.shear_modes
         coarser = quarter._replace(level=1, modes=count)
-        out.append(CoarserRuns((coarser,), second_order_errors, quarter, "mesh"))
+        rule = face_errors if model.has_irregular_edges else second_order_errors
+        out.append(CoarserRuns((coarser,), rule, quarter, "mesh"))
         if count:
             coarser = quarter._replace(modes=slip.shear_modes.comparison_mode_count(count))
             out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))

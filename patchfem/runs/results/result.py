@@ -136,11 +136,17 @@ class RunInputs:
         return self.patches[1:]
 
     @property
+    def n_coarse(self) -> int:
+        """Number of coarser meshes on which the patch of the table [contact] is solved."""
+        return sum(patch is not None for patch in self.coarse)
+
+    @property
     def has_error_meshes(self) -> bool:
         """Whether each patch on whose mesh the motion depends is solved on a coarser mesh too."""
-        rig = self.plan.model.rig
-        moves = rig is not None and (rig.friction.load_varies or rig.friction.bands_slide_apart)
-        return all(face.patches[1] is not None for face in self.faces if face.partial_slip or moves)
+        depends = self.plan.model.motion_depends_on_mesh
+        return all(
+            face.patches[1] is not None for face in self.faces if face.partial_slip or depends
+        )
 
 
 class Settings(NamedTuple):

@@ -16,7 +16,7 @@ from ... import friction, hybrid, slip
 from ...convergence import ERROR_SAFETY_FACTOR
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
-from ...response.coarser import CoarserRuns, ComparisonRuns, second_order_errors
+from ...response.coarser import CoarserRuns, ComparisonRuns, face_errors, second_order_errors
 from ...response.errors import (
     absolute_change,
     convergence_errors,
@@ -50,8 +50,8 @@ class Engine(NamedTuple):
     - name: name in `scene.rules.methods.ENGINE_SUPPORT`, which says what it can compute.
     - method: value of accuracy.method that selects the engine.
     - list_time_runs: function (model, numerics) that returns runs that are coarser in time.
-    - list_space_runs: function (model, numerics, patch, coarse, solution) that returns runs that are coarser in space;
-      coarse is the Patch of [contact] on a coarser mesh, or None.
+    - list_space_runs: function (model, numerics, patch, n_coarse, solution) that returns runs that are coarser in space;
+      n_coarse is the number of coarser meshes on which the patch of [contact] is solved.
     - has_steps: whether its time steps have equal lengths, so that it saves its state during a run.
     - finds_periodic_motion: whether it computes periodic motions directly.
     """
@@ -114,7 +114,7 @@ def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> li
     Interfaces with equal patches are coarsened together.
     `numerics` are the settings of the run, and `has_coarse_patch` tells whether the patch of [contact] matters.
     """
-    meshes = [replace(numerics, coarse_patch=True)] * has_coarse_patch
+    meshes = [replace(numerics, coarse_patch=1)] * has_coarse_patch
     if model.rig.friction.has_partial_slip:
         groups = faces.group_interfaces_with_coarse_mesh(model)
         meshes += [replace(numerics, meshed=interfaces) for interfaces in groups]
@@ -132,12 +132,12 @@ def _list_march_time_runs(model: Model, numerics) -> ComparisonRuns:
     return [CoarserRuns(runs, partial(convergence_errors, steps=numerics.steps), source="steps")]
 
 
-def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
+def _list_march_space_runs(model: Model, numerics, patch, n_coarse, solution) -> ComparisonRuns:
     """List the comparison runs of a time integration with another spatial discretization.
 
     Each has a quarter of the steps of the run and is compared with a run that has as many:
 
-    - a coarser mesh, if the run has a coarser patch and its load varies or it slips in part;
+    - one or two coarser meshes, if the run has them and depends on its mesh;
     - another number of shear modes, if the load varies, the slide goes over grooves, or a law acts at the nodes of a
       patch;
     - half the cells of an Iwan model, which represent its continuous density to order 2;
@@ -149,8 +149,10 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> C
         Model of a rig.
     numerics : Numerics
         Settings of the run.
-    patch, coarse : Patch or None
-        Solved patch, and the patch on a coarser mesh.
+    patch : Patch or None
+        Solved patch.
+    n_coarse : int
+        Number of coarser meshes on which the patch of [contact] is solved.
     solution : Solution
         Results of the run.
     """
@@ -160,11 +162,14 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> C
     n_modes = None if shape is None else shape.size
 
     # Both runs have the same number of shear modes, so that only the mesh changes.
-    depends = coarse is not None and bool(varies or model.partial_slip)
+    depends = n_coarse > 0 and model.motion_depends_on_mesh
     meshes = _list_coarse_meshes(model, quarter, has_coarse_patch=depends)
     if depends and n_modes:
         meshes[0] = replace(meshes[0], shear_modes=n_modes)
     coarser_runs = [CoarserRuns((mesh,), second_order_errors, quarter, "mesh") for mesh in meshes]
+    if depends and model.has_irregular_edges:
+        runs = tuple(replace(meshes[0], coarse_patch=k + 1) for k in range(min(n_coarse, 2)))
+        coarser_runs[0] = CoarserRuns(runs, face_errors, quarter, "mesh")
 
     reduction = getattr(solution.contact, "reduction", None)
     has_modes = isinstance(reduction, slip.shear_modes.ShearModes)
@@ -258,7 +263,7 @@ def estimate_hybrid_errors(values: Values, coarse_values: Values, rtol: float) -
     return hybrid.runs.estimate_errors(shared, coarse_values, rtol)
 
 
-def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
+def _list_hybrid_space_runs(model: Model, numerics, patch, n_coarse, solution) -> ComparisonRuns:
     """List the comparison runs of the engine `hybrid` on coarser meshes.
 
     The mesh matters only for patches that slip part by part, for the loads of strips, and for the slip force of an
@@ -271,8 +276,10 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
         Model of a rig.
     numerics : Numerics
         Settings of the run.
-    patch, coarse : Patch or None
-        Solved patch, and the patch on a coarser mesh.
+    patch : Patch or None
+        Solved patch.
+    n_coarse : int
+        Number of coarser meshes on which the patch of [contact] is solved.
     solution : Solution
         Results of the run.
     """
@@ -280,7 +287,7 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
     bands_slide_apart = model.rig.friction.bands_slide_apart
     is_smooth = (bands_slide_apart or averaged) and not model.partial_slip
     rule = second_order_errors if is_smooth else convergence_errors
-    depends = coarse is not None and bool(model.partial_slip or is_smooth)
+    depends = n_coarse > 0 and bool(model.partial_slip or is_smooth)
     meshes = _list_coarse_meshes(model, numerics, has_coarse_patch=depends)
     coarser_runs = [CoarserRuns((mesh,), rule, source="mesh") for mesh in meshes]
     if bands_slide_apart:
@@ -288,14 +295,14 @@ def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> 
     return coarser_runs
 
 
-def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> ComparisonRuns:
+def _list_steady_space_runs(model: Model, numerics, patch, n_coarse, solution) -> ComparisonRuns:
     """List the comparison runs of a steady motion on coarser meshes.
 
     The first entry has no runs, but the errors that the solver of the motion knows by measure (`solution.errors`).
-    `patch` is the solved patch and `coarse` that on a coarser mesh, or None without them.
+    `patch` is the solved patch or None, and `n_coarse` the number of coarser meshes on which it is solved.
     """
     own = CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})
-    return [own, *_list_hybrid_space_runs(model, numerics, patch, coarse, solution)]
+    return [own, *_list_hybrid_space_runs(model, numerics, patch, n_coarse, solution)]
 
 
 def _list_linear_time_runs(model: Model, numerics) -> ComparisonRuns:

@@ -39,7 +39,7 @@ class Numerics:
     - local: largest relative error per step of the engine `hybrid`.
     - other_rig: index of the rig with other modes of a reduced structure, or None.
     - meshed: indices of the interfaces whose patches have a coarser mesh.
-    - coarse_patch: whether the patch of [contact] has a coarser mesh.
+    - coarse_patch: how many times the mesh of the patch of [contact] is coarser by a factor of 2.
     - stiffer_joint: whether a joint that is subtracted from bolted modes is stiffer by its error.
     - has_half_cells: whether Iwan models of time steps have half their cells.
     """
@@ -54,7 +54,7 @@ class Numerics:
     local: float = 0.0
     other_rig: int | None = None
     meshed: tuple[int, ...] = ()
-    coarse_patch: bool = False
+    coarse_patch: int = 0
     stiffer_joint: bool = False
     has_half_cells: bool = False
 

@@ -219,7 +219,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
 
     # Comparison runs on coarser meshes, with other modes and with other joints; more steps do not repeat them.
     space_runs = [
-        *engine.list_space_runs(model, numerics, inputs.patch, inputs.coarse[0], first),
+        *engine.list_space_runs(model, numerics, inputs.patch, inputs.n_coarse, first),
         *list_runs_with_other_modes(model, numerics),
     ]
     space_runs += _list_joint_runs(inputs, space_runs)
@@ -264,7 +264,7 @@ def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> Compariso
     joint_runs = []
     for kind in space_runs:
         if kind.runs and kind.runs[0].coarse_patch:
-            stiffer = replace(kind.runs[0], coarse_patch=False, stiffer_joint=True)
+            stiffer = replace(kind.runs[0], coarse_patch=0, stiffer_joint=True)
             joint_runs.append(CoarserRuns((stiffer,), absolute_change, kind.reference, "mesh"))
     return joint_runs
 
@@ -441,7 +441,7 @@ def _add_decay_curve(run: CoupledRun) -> CoupledRun:
     if not mesh_errors.reason:
         return replace(run, decay=decay)
     coarser = ENGINES[run.numerics.engine].list_space_runs(
-        model, run.numerics, run.patch, coarse, solution
+        model, run.numerics, run.patch, run.inputs.n_coarse, solution
     )
     note = decays.describe_unknown_mesh_error(mesh_errors.reason, coarser)
     return replace(run, decay=decay, notes=(note,))

@@ -79,7 +79,7 @@ class Runner:
         The settings say what is coarser: the mesh, the modes of a reduced structure, or a joint whose stiffness differs.
         """
         model = self.model
-        patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
+        patch = self.inputs.patches[numerics.coarse_patch]
         if numerics.other_rig is not None:
             model = replace(model, rig=model.rig.structure.other_rigs[numerics.other_rig])
         if numerics.stiffer_joint:
