@@ -4,7 +4,7 @@ A case moves by exact steps if its law is linear between events (`linear_cases_k
 is smooth (`smooth_cases_kernels`). A motion that repeats is not computed again up to its last cycles.
 """
 
-from math import pi
+from math import inf, pi
 
 from ..compiled.flags_kernels import NJIT_KERNEL
 from ..compiled.jit import njit
@@ -17,9 +17,13 @@ from .case_observers_kernels import (
     start_cycle,
     start_window,
 )
-from .case_rows import SAME_CASE_CYCLE, SAME_SMOOTH_CYCLE, WINDOW_STEPS, Now, Number
+from .case_rows import SAME_CASE_CYCLE, SAME_SMOOTH_CYCLE, WINDOW_STEPS, Now, Number, Seen
 from .law_rows import Law, Memory
 from .smooth_laws_kernels import PointLaw
+
+# Pieces of a run, which take 1 to 2 CPU seconds. A law that needs more is so much faster than the drive that a single run
+# computes or refuses it.
+MAX_PIECES = 4_000_000
 
 
 @njit(**NJIT_KERNEL)
@@ -99,6 +103,7 @@ def march_cases(steps, parameters, laws, nows, seens, histories, loops):
         n_cycles = int(case[Number.CYCLES])
         first = n_cycles - int(case[Number.WINDOW])
         cycle = 0
+        n_pieces = 0
         while cycle < n_cycles:
             observes = cycle >= first
             if cycle == first:
@@ -111,7 +116,8 @@ def march_cases(steps, parameters, laws, nows, seens, histories, loops):
 
             left = 2 * pi / case[Number.OMEGA]
             n_events = 0
-            while left > 0:
+            while left > 0 and n_pieces < MAX_PIECES:
+                n_pieces += 1
                 if is_linear:
                     piece = linear.advance(block, left, n_events, observes, now, seen)
                     n_events = n_events + 1 if piece.duration < block.step else 0
@@ -133,6 +139,8 @@ def march_cases(steps, parameters, laws, nows, seens, histories, loops):
                 cycle += n_repeated
                 first = cycle
 
+        if n_pieces == MAX_PIECES:
+            seen[Seen.SAMPLED] = inf  # the work check fails, as the motion is not known
         now[Now.ELASTIC] = law.memory[Memory.ENERGY]
         if is_linear and point.stiffness > 0:
             now[Now.ELASTIC] = 0.5 * now[Now.FORCE] ** 2 / point.stiffness

@@ -142,3 +142,10 @@ def test_exact_short_stop_between_two_steps_is_found():
     few, many = [cases.march_cases(batch, steps).values for steps in (8, 256)]
     for measure in ("friction_work", "stick_fraction"):
         np.testing.assert_allclose(few[measure], many[measure], rtol=1e-10, atol=1e-15)
+
+
+def test_always_law_much_faster_than_drive_ends():
+    """A case whose law needs more steps than a run may take ends, and its work check fails; the cases beside it go on."""
+    speeds = np.array([1e-3, 1e-12]) * DRIVE.acceleration / OMEGA
+    values = cases.march_cases(make("tanh", [2 * LIMIT] * 2, reference_speed=speeds), 20).values
+    assert values["work_check"][0] < 1e-2 and values["work_check"][1] == np.inf
