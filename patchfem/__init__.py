@@ -23,7 +23,7 @@ Read the package in this order. A module imports only from its own entry of the 
 19. `slip`         partial slip of the pieces: elements, shear modes, tangents
 20. `structure`    modes and drive of the rig
 21. `hybrid`       motion from event to event by steps of order 8
-22. `points`       steps of order 2: many contact points, and sweeps over many cases
+22. `points`       sweeps over many cases of one mode and one contact point
 23. `time_steps`   steps of order 2 of contact points under every law with every effect
 24. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
 25. `response`     measures of a run: outcome, events, levels and free vibration

@@ -4,7 +4,7 @@
 which some imports are replaced. The module, and with it numba, is imported only if a function is called whose machine
 code is not stored.
 `jit` contains the decorator `njit` of all kernels, `machine` compiles, stores and loads machine code, `portable` has code
-that needs no numba, `cache_files` is the cache of numba for functions that `machine` cannot store. Read
+that needs no numba. Where `machine` cannot store a function, numba stores it in the same folder. Read
 `load_compiled_module`, `instantiate` and `KernelFunction` first.
 
 The cache of numba detects a change of the file of a function, but not of the modules whose functions it calls, and it
@@ -37,6 +37,7 @@ from time import monotonic, process_time, sleep, time
 from .. import cost_model
 from ..disk import user_cache
 from ..disk.installed import find_package_version
+from ..disk.lock import lock_file
 from . import machine
 from .portable import read_portable_codes
 
@@ -230,29 +231,20 @@ def pause_garbage_collection():
 def lock_exclusively(path: Path):
     """Let one process at a time run the block, by a lock on the file `path`.
 
-    The operating system releases the lock if the process is killed. Other processes wait for at most `MAX_LOCK_WAIT_SECONDS`
-    seconds, because the lock of a machine that has disappeared may remain on a network file system. On a file system
-    without locks no process waits.
+    Other processes wait for at most `MAX_LOCK_WAIT_SECONDS` seconds, because the lock of a machine that has disappeared may
+    remain on a network file system.
     """
     try:
-        import fcntl
-
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         file = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)
-    except (ImportError, OSError):  # raised on Windows, or if the folder is not writable
+    except OSError:  # the folder is not writable
         yield
         return
     try:
         # Ask again and again. A lock that waits by itself could not be given up.
         end = monotonic() + MAX_LOCK_WAIT_SECONDS
-        while monotonic() < end:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                sleep(LOCK_CHECK_SECONDS)
-            except OSError:
-                break
+        while not lock_file(file) and monotonic() < end:
+            sleep(LOCK_CHECK_SECONDS)
         yield
     finally:
         os.close(file)
@@ -522,11 +514,11 @@ def _prepare_cache(report=None) -> Path:
     """
     if report is not None:
         REPORT[0] = report
-    return _set_cache_folder()
+    return set_cache_folder()
 
 
 @cache
-def _set_cache_folder() -> Path:
+def set_cache_folder() -> Path:
     """Return the cache folder, and make numba and child processes use it."""
     folder, reason = _choose_folder_once()
     if reason:

@@ -6,6 +6,7 @@ without `cache=True` skips these steps here. Its LLVM code is linked into its ca
 optimises each function that Python calls once, with all that it calls.
 """
 
+from contextlib import suppress
 from functools import wraps
 from types import SimpleNamespace
 
@@ -18,7 +19,7 @@ from numba.core.compiler_machinery import PassManager
 from numba.core.registry import CPUDispatcher
 from numba.core.types.functions import BaseFunction
 
-from .cache_files import store_on_disk
+from .. import compiled
 from .integer_enums import register_integer_enums
 from .machine import create_pass_builder, create_target_machine
 from .pass_by_reference import get_argument_type
@@ -48,6 +49,14 @@ NUMBA_PASSES = (
 )
 
 register_integer_enums()
+
+
+def store_on_disk(function):
+    """Make a numba dispatcher, `function`, store its machine code in the cache folder, and return it."""
+    compiled.set_cache_folder()
+    with suppress(RuntimeError):  # a function without a source file is compiled by every process
+        function.enable_caching()
+    return function
 
 
 def njit(cache: bool = False, **options):
@@ -118,7 +127,6 @@ class InlinedDispatcher(CPUDispatcher):
     def __init__(self, function, names, options, compiler):
         super().__init__(function, names, options | NO_C_WRAPPER | NO_PYTHON_WRAPPER, compiler)
         self._standalone = CPUDispatcher(function, names, options | NO_C_WRAPPER)
-        self._is_stored_on_disk = False
 
     def get_call_template(self, args, kws):
         """Resolve a call by the types of its arguments, not by the values of constants.
@@ -134,16 +142,9 @@ class InlinedDispatcher(CPUDispatcher):
     def __call__(self, *arguments):
         return self._standalone(*arguments)
 
-    def enable_caching(self):
-        """Store the machine code for calls from Python on disk."""
-        if not self._is_stored_on_disk:
-            store_on_disk(self._standalone)
-            self._is_stored_on_disk = True
-
     def get_standalone(self) -> CPUDispatcher:
         """Return the dispatcher for calls from Python, whose machine code is stored on disk."""
-        self.enable_caching()
-        return self._standalone
+        return store_on_disk(self._standalone)
 
 
 def compile_unoptimised(

@@ -35,7 +35,7 @@ PUBLIC = {
         "find_package_version",
         "list_installed_versions",
     ),
-    "lock": ("FolderLock",),
+    "lock": ("FolderLock", "lock_file"),
     "open_with_timeout": ("open_for_reading",),
     "user_cache": (
         "find_cache_base",

@@ -13,6 +13,23 @@ from ..core import Missing
 MAX_LOCK_BYTES = 20  # number of bytes that are read of a lock file
 
 
+def lock_file(file: int) -> bool:
+    """Lock an open file by its descriptor, and return False if another process holds the lock.
+
+    The operating system releases the lock when the file is closed, also of a process that is killed. A system or a disk
+    without locks lets all processes through.
+    """
+    try:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except (ImportError, OSError):  # Windows, or a disk that supports no locks
+        return True
+    return True
+
+
 class FolderLock:
     """Lock file that a process holds while it writes to a folder.
 
@@ -62,21 +79,14 @@ class FolderLock:
 
     def _lock(self, file: int) -> None:
         """Lock an open file, or close it and raise Missing."""
-        try:
-            import fcntl
-        except ImportError:  # raised on Windows
+        if lock_file(file):
             return
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            process = os.read(file, MAX_LOCK_BYTES).decode("utf-8", "replace")
-            os.close(file)
-            raise Missing(
-                f"{self.folder}: another {self.kind} (process {process}) is writing to this folder; wait until that "
-                "process ends, or name another folder with -o"
-            ) from None
-        except OSError:  # a disk that supports no locks
-            pass
+        process = os.read(file, MAX_LOCK_BYTES).decode("utf-8", "replace")
+        os.close(file)
+        raise Missing(
+            f"{self.folder}: another {self.kind} (process {process}) is writing to this folder; wait until that "
+            "process ends, or name another folder with -o"
+        )
 
     def release(self) -> None:
         """Remove the file, unless it is that of another writer, and then unlock it."""

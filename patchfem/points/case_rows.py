@@ -154,8 +154,7 @@ class Cases(NamedTuple):
     """Cases of one mode and one contact point under a sinusoidal drive.
 
     - parameters (c, 12): see `Number`
-    - numbers (k, c), memory (m, c): parameters of the friction law and its state at the start, see
-      `return_maps_kernels`
+    - numbers (c, k), memory (c, l): numbers of the friction law and its memory at the start, see `smooth_laws_kernels`
     - reference (c,): stiffness of the first mode at the contact [N/m], 0 if unknown
     """
 
@@ -163,12 +162,3 @@ class Cases(NamedTuple):
     numbers: np.ndarray
     memory: np.ndarray
     reference: np.ndarray
-
-    def select(self, cases) -> "Cases":
-        """Return some of the cases, by a mask or by indices."""
-        return Cases(
-            self.parameters[cases],
-            np.ascontiguousarray(self.numbers[:, cases]),
-            np.ascontiguousarray(self.memory[:, cases]),
-            self.reference[cases],
-        )

@@ -123,7 +123,7 @@ def find_mean_stretches(cases: Cases, now, seen, loops) -> np.ndarray:
 
 def is_linear_between_events(cases: Cases) -> bool:
     """Return whether the law of the cases is linear between events, so that their march is exact with any steps."""
-    return cases.numbers[0, 0] in (Law.COULOMB, Law.JENKINS)
+    return cases.numbers[0, 0] <= Law.JENKINS
 
 
 def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.ndarray]:

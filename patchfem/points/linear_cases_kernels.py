@@ -183,22 +183,20 @@ def make_free_step(regime, dt):
 
 
 @njit(**NJIT_KERNEL)
-def make_point(case, numbers, j):
+def make_point(case, numbers):
     """Return the `Point` of a case.
 
     Parameters
     ----------
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
-    numbers : (k, c) array
-        Numbers of the laws.
-    j : int
-        Column of the case.
+    numbers : (k,) array
+        Numbers of the law.
     """
-    limit = numbers[1, j] * case[Number.LOAD]
-    if numbers[0, j] == Law.COULOMB:
-        return Point(limit, numbers[2, j] * case[Number.LOAD], 0.0, case[Number.MOBILITY])
-    return Point(limit, limit, limit / numbers[2, j], case[Number.MOBILITY])
+    limit = numbers[1]
+    if numbers[0] == Law.COULOMB:
+        return Point(limit, numbers[2], 0.0, case[Number.MOBILITY])
+    return Point(limit, limit, limit / numbers[2], case[Number.MOBILITY])
 
 
 @njit(**NJIT_KERNEL)

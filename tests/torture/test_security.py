@@ -37,7 +37,6 @@ HARMLESS = {
     ("compiled", "compile()"),
     ("compiled", "exec()"),  # a loop of the package in which its friction law is inserted
     ("__main__", "shell=shell"),
-    ("compiled.cache_files", "pickle"),  # numba's format of machine code, in a folder of the user
 }
 FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); json.load(f)"
 

@@ -1,4 +1,4 @@
-"""LuGre law, compiled, for the return maps of `points`. Equations: `lugre`.
+"""LuGre law, compiled, for `points`. Equations: `lugre`.
 
 numbers: static and kinetic force [N], stiffness [N/m], Stribeck velocity v_s [m/s], micro-damping and viscous damping
 [N s/m]; memory: stretch z [m]. At the constant velocity of a step, z relaxes towards +-g/stiffness over that length of

@@ -29,7 +29,8 @@ from ...points.case_rows import (
     Number,
 )
 from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
-from ...points.laws import N_NUMBERS, make_point_law
+from ...points.law_rows import Law
+from ...points.laws import N_NUMBERS, POINT_LAWS, list_point_law
 from ...response import rows
 from ...response.errors import ERROR_MEASURES, convergence_errors, total_error
 from ...response.outcome import (
@@ -155,7 +156,7 @@ def refusal_reason(model: Model) -> str:
         or rig.friction.names
         or rig.springs.is_nonlinear
         or np.isfinite(rig.springs.travel)
-        or law_has_trait(friction.law, "averaged")
+        or friction.law not in POINT_LAWS
     ):
         return "the interface of the case is not one point under a constant load, or its flexure has an end stop"
 
@@ -215,7 +216,7 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
     results = CaseResults.blank(len(models))
     is_alone = np.ones(len(models), bool)
     for indices, refined in refine(cases, scales):
-        part = cases.select(indices), _select(scales, indices), refined
+        part = _select(cases, indices), _select(scales, indices), refined
         part_results = make_results(select_models(models, indices), *part)
         is_alone[indices] = needs_single_run(*part, part_results)
         results.insert(indices, part_results)
@@ -233,9 +234,8 @@ def collect_cases(models: Sequence[Model]) -> tuple[Cases, Scales]:
     columns = collect_columns(models, _list_numbers)
     n_numbers, n_scales = len(Number), len(Scales._fields)
     ends = [n_numbers, n_numbers + N_NUMBERS, -1 - n_scales, -n_scales]
-    parameters, numbers, memory, reference, scales = np.split(columns, ends)
-    law = np.ascontiguousarray(numbers), np.ascontiguousarray(memory)
-    return Cases(np.ascontiguousarray(parameters.T), *law, reference[0]), Scales(*scales)
+    *arrays, reference, scales = np.split(columns, ends)
+    return Cases(*(np.ascontiguousarray(part.T) for part in arrays), reference[0]), Scales(*scales)
 
 
 def _list_numbers(model: Model) -> tuple:
@@ -249,7 +249,6 @@ def _list_numbers(model: Model) -> tuple:
     # Bonds of a batch do not grow.
     has_bonds = law_has_trait(friction.law, "bonds")
     law = Bonds(friction.static, friction.bond_length) if has_bonds else make_law(friction, load)
-    point_law = make_point_law(friction.law, law, load)
     cycles = int(rig.drive.cycles)
 
     # Stiffness during stick: friction limit / bond length for laws with a length.
@@ -262,8 +261,7 @@ def _list_numbers(model: Model) -> tuple:
     # The order is that of `collect_cases`: `Number`, law, memory, stiffness of the mode, `Scales`.
     return (
         *list_parameters(rig.modes, rig.drive.signal, load, cycles, min(10, cycles // 10), rig.start),
-        *point_law.numbers,
-        *point_law.memory,
+        *list_point_law(friction.law, law, load),
         rig.first_mode.stiffness,
         model.accuracy.tolerance,
         rig.displacement_scale,
@@ -296,7 +294,7 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
     if is_linear_between_events(cases):
         remaining = np.flatnonzero(has_closed_form(cases, scales))
         if remaining.size:
-            part = cases.select(remaining)
+            part = _select(cases, remaining)
             march = march_cases(part, EXACT_STEPS_PER_CYCLE)
             errors = estimate_exact_errors(part, _select(scales, remaining), march)
             is_met = np.ones(remaining.size, bool)
@@ -305,7 +303,7 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
 
     coarse = march_cases(cases, BATCH_STEPS_PER_CYCLE[0])
     for count in BATCH_STEPS_PER_CYCLE[1:]:
-        part_cases, part = cases.select(remaining), _select(scales, remaining)
+        part_cases, part = _select(cases, remaining), _select(scales, remaining)
         fine = march_cases(part_cases, count)
         errors = estimate_errors(part_cases, fine.values, coarse.values, count)
         is_met = np.ones(remaining.size, bool)
@@ -598,7 +596,7 @@ def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
     """Return the largest slip amplitude (n,) [m] of a sticking interface; -1 of a law that never sticks."""
     stiffness = scales.stick_stiffness
     if not stiffness.any():
-        return np.where(cases.numbers[0] == 0, 0.0, -1.0)
+        return np.where(cases.numbers[:, 0] == Law.COULOMB, 0.0, -1.0)
     return MAX_STICKING_SLIP_RATIO * scales.limit / stiffness
 
 

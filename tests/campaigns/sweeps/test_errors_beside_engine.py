@@ -38,7 +38,7 @@ def compare_sweep(law: str, seed: int, n_cases: int = N_CASES) -> list[Row]:
     rows = []
     for case, numbers in enumerate(sets):
         truth, coarse = (
-            batches.solve_models([pf.build(text, **numbers, **more)], estimate=False).values
+            batches.solve_models([pf.build(text, **numbers, **more)]).values
             for more in (EXACT, COARSE)
         )
         for name in truth.keys() - OTHER_MEASURES:
