@@ -41,7 +41,6 @@ class PressedCells(NamedTuple):
     - tilt_x, tilt_y: Tilts [rad] that the holder adds to those in the gap: positive ones open the gap at +x and at +y. A
       tilt along x turns the holder about y.
     - n_iterations: Number of steps of the solver.
-    - residual: Largest wrong gap over the largest displacement.
     """
 
     pressure: np.ndarray
@@ -50,7 +49,6 @@ class PressedCells(NamedTuple):
     tilt_x: float
     tilt_y: float
     n_iterations: int
-    residual: float
 
 
 def press_cells(
@@ -92,61 +90,47 @@ def press_cells(
             "contact.area.hardness: a pressure of at most the hardness carries "
             f"{largest_load:.4g} N on the face, less than the load of {loading.load:.4g} N; raise the hardness"
         )
-    problem = _make_problem(compliance, gap, loading)
+    # Motions of the holder, with load lines and springs; those that are not free stay
+    x = np.broadcast_to(compliance.x, gap.shape)
+    y = np.broadcast_to(compliance.y[:, None], gap.shape)
+    axes = {
+        "closing": (np.ones(gap.shape), 1.0, 0.0),
+        "tilt_x": (x, loading.line_x, loading.spring_x),
+        "tilt_y": (y, loading.line_y, loading.spring_y),
+    }
+    is_loaded = loading.load is not None
+    free = {name: axis for name, axis in axes.items() if is_loaded and axis[1] is not None}
+    for motion, line, spring in free.values():
+        outermost = motion.max()
+        if spring == 0 and abs(line) > outermost:
+            raise NotConverged(
+                f"contact: the load line at {abs(line):.5g} m lies beyond the centres of the outermost cells, at "
+                f"{outermost:.5g} m, so that no pressure of these cells balances the load; raise contact.area.cells or "
+                "move contact.load_line inwards"
+            )
+
+    # The gap counts from its lowest point, or from the approach
+    first_approach = gap.min() if is_loaded else loading.approach
+    motions = np.array([axis[0] for axis in free.values()])
+    target = (
+        (loading.load or 0.0) / compliance.cell_area * np.array([axis[1] for axis in free.values()])
+    )
+    springs = np.array([axis[2] for axis in free.values()]) / compliance.cell_area
+    problem = BoundedProblem(gap - first_approach, 0.0, loading.hardness, motions, target, springs)
     solution = solve_bounded(compliance, problem, start, tolerance, MAX_ITERATIONS)
     if not solution.residual <= tolerance:
         raise NotConverged(
             f"contact: the pressure did not converge; after {solution.n_iterations} steps the gap "
             f"is wrong by {solution.residual:.1e} of the displacement, more than {tolerance:.1e}"
         )
-
-    # Approach and tilts of the holder; those that are not free stay
-    motion = iter(solution.motion.tolist())
-    approach = float((gap - problem.gap).flat[0]) + next(motion, 0.0)
-    is_loaded = loading.load is not None
-    tilt_x = -next(motion) if is_loaded and loading.line_x is not None else 0.0
-    tilt_y = -next(motion) if is_loaded and loading.line_y is not None else 0.0
-    open_gap = np.where(solution.traction > 0, 0.0, np.maximum(solution.slope, 0.0))
+    found = dict(zip(free, solution.motion.tolist()))
     return PressedCells(
-        solution.traction,
-        open_gap,
-        approach,
-        tilt_x,
-        tilt_y,
-        solution.n_iterations,
-        solution.residual,
-    )
-
-
-def _make_problem(compliance: CellCompliance, gap, loading: FaceLoading) -> BoundedProblem:
-    """Return the bounded problem of a loading, with a gap [m] from its lowest point or from the approach."""
-    if loading.load is None:
-        return BoundedProblem(gap - loading.approach, 0.0, loading.hardness)
-    x = np.broadcast_to(compliance.x, gap.shape)
-    y = np.broadcast_to(compliance.y[:, None], gap.shape)
-    axes = [
-        (np.ones(gap.shape), 1.0, 0.0),
-        (x, loading.line_x, loading.spring_x),
-        (y, loading.line_y, loading.spring_y),
-    ]
-    for motion, line, spring in axes[1:]:
-        outermost = motion.max()
-        if line is not None and spring == 0 and abs(line) > outermost:
-            raise NotConverged(
-                f"contact: the load line at {abs(line):.5g} m lies beyond the centres of the outermost cells, at "
-                f"{outermost:.5g} m, so that no pressure of these cells balances the load; raise contact.area.cells or "
-                "move contact.load_line inwards"
-            )
-    motions, lines, springs = zip(*(axis for axis in axes if axis[1] is not None))
-    area = compliance.cell_area
-    target = loading.load / area * np.array(lines)
-    return BoundedProblem(
-        gap - gap.min(),
-        0.0,
-        loading.hardness,
-        np.array(motions),
-        target,
-        np.array(springs) / area,
+        pressure=solution.traction,
+        gap=np.where(solution.traction > 0, 0.0, np.maximum(solution.slope, 0.0)),
+        approach=float(first_approach) + found.get("closing", 0.0),
+        tilt_x=-found.get("tilt_x", 0.0),
+        tilt_y=-found.get("tilt_y", 0.0),
+        n_iterations=solution.n_iterations,
     )
 
 

@@ -228,9 +228,11 @@ def _compute_changes(x: Axis, y: Axis, depths, stack: LayerStack):
         block = _Quarter((x, y), (parity_x, parity_y), depths, stack)
         free = block.condense(())
         guided = block.condense(NORMAL_GUIDES)
-        normal[parity_x, parity_y] = block.select(free - guided, 2)
+        inward = block.find_rows(2)
+        normal[parity_x, parity_y] = (free - guided)[inward, inward]
         guided = block.condense(SHEAR_GUIDES)
-        shear[1 - parity_x, parity_y] = block.select(free - guided, 0)
+        along = block.find_rows(0)
+        shear[1 - parity_x, parity_y] = (free - guided)[along, along]
     return normal, shear
 
 
@@ -260,13 +262,12 @@ class _Quarter:
             parts = [_evaluate(splines[(parity + (k == axis)) % 2]) for k in range(3)]
             functions.append(parts)
         self.shapes = [tuple(parts[k].values.shape[2] for parts in functions) for k in range(3)]
+        self.starts = np.cumsum([0, *(n_x * n_y for n_x, n_y in self.shapes)])
         self.in_plane = self._assemble_in_plane(*functions)
 
-    def select(self, compliance: np.ndarray, component: int) -> np.ndarray:
-        """Return the part (m, m) of a compliance of the face that belongs to displacements and forces along an axis."""
-        starts = np.cumsum([0, *(n_x * n_y for n_x, n_y in self.shapes)])
-        part = slice(starts[component], starts[component + 1])
-        return compliance[part, part]
+    def find_rows(self, component: int) -> slice:
+        """Return the rows of matrices over the face for displacements along an axis (2: inward)."""
+        return slice(self.starts[component], self.starts[component + 1])
 
     def _assemble_in_plane(self, along_x, along_y) -> np.ndarray:
         """Return the in-plane factors of the stiffness, (2, 2, 2, f, f).
@@ -274,8 +275,8 @@ class _Quarter:
         They belong to the Lame constants lambda and mu, to a test function that is not or is differentiated along z, and to
         such a trial function. `along_x` and `along_y` hold the functions of the three displacements.
         """
+        out = np.zeros((2, 2, 2, self.starts[-1], self.starts[-1]))
         # lambda div v div u + mu (grad v + grad v^T) : grad u, as (modulus, components of v and u, axes of their slopes)
-        blocks = np.zeros((2, 2, 2, 3, 3), object)
         for a, b in np.ndindex(3, 3):
             terms = ((0, a, b, a, b), (1, a, b, b, a), (1, a, a, b, b))
             for modulus, test, trial, test_axis, trial_axis in terms:
@@ -283,15 +284,8 @@ class _Quarter:
                 for axis, functions in enumerate((along_x, along_y)):
                     slopes = test_axis == axis, trial_axis == axis
                     parts.append(functions[test].integrate(functions[trial], *slopes))
-                slot = (modulus, int(test_axis == 2), int(trial_axis == 2), test, trial)
-                blocks[slot] = blocks[slot] + np.kron(*parts)
-        sizes = [n_x * n_y for n_x, n_y in self.shapes]
-        out = np.zeros((2, 2, 2, sum(sizes), sum(sizes)))
-        starts = np.cumsum([0, *sizes])
-        for *slot, a, b in np.ndindex(blocks.shape):
-            rows = slice(starts[a], starts[a + 1])
-            columns = slice(starts[b], starts[b + 1])
-            out[*slot, rows, columns] = blocks[*slot, a, b]
+                factors = out[modulus, int(test_axis == 2), int(trial_axis == 2)]
+                factors[self.find_rows(test), self.find_rows(trial)] += np.kron(*parts)
         return out
 
     def condense(self, guides) -> np.ndarray:

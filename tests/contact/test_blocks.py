@@ -334,6 +334,45 @@ def test_exact_rigid_cells_on_a_spring_share_its_force():
     assert find_cell_modes(rigid, limit.ravel(), 4).stiffness.size == 1
 
 
+def test_exact_finer_bricks_keep_partial_slip():
+    """Bricks of the free sides two levels finer change the force at half of gross slip by 2e-4, the stiffness by 1e-3."""
+    forces, stiffnesses = [], []
+    for level in (1, 3):
+        block = get_block(level=level)
+        gap = ROLL / 2 * (block.normal.x + block.normal.y[:, None])
+        pressure = press_cells(block.normal, gap, FaceLoading(LOAD)).pressure
+        elements = make_cell_elements(block.shear, 0.3 * pressure)
+        forces.append(np.minimum(0.17e-6, elements.yield_displacement) @ elements.stiffness)
+        stiffnesses.append(compute_set_stiffness(block.shear, np.ones((64, 64), bool)))
+    assert forces[0] == pytest.approx(forces[1], rel=2e-4)
+    assert stiffnesses[0] == pytest.approx(stiffnesses[1], rel=1e-3)
+
+
+def test_exact_small_sphere_on_blocks_has_the_local_stiffness_of_mindlin(radius=0.5):
+    """Gross slip exceeds the friction limit over the stiffness by half of Mindlin's local displacement, within 1 %.
+
+    The block adds a displacement in proportion to the force, which the difference leaves out.
+    """
+    block = get_block(
+        SQUARE, make_stack(HEIGHT, 0.0, Layers(TITANIUM, TITANIUM, "strain")), (256, 256)
+    )
+    normal = block.normal
+    pressed = press_cells(
+        normal, (normal.x**2 + normal.y[:, None] ** 2) / 2 / radius, FaceLoading(LOAD)
+    )
+    limit = 0.3 * pressed.pressure
+    gross_slip = float(block.shear.product(limit)[limit > 0].max())
+    friction = 0.3 * LOAD
+    local = friction / (2 * (gross_slip - friction / compute_set_stiffness(block.shear, limit > 0)))
+
+    young, poisson = TITANIUM
+    modulus = young / (1 - poisson**2) / 2
+    half = (3 * LOAD * radius / 4 / modulus) ** (1 / 3)
+    mindlin = 4 * half * young / (2 * (1 + poisson)) / (2 - poisson)
+    assert half < 0.14 * HEIGHT
+    assert local == pytest.approx(mindlin, rel=0.01)
+
+
 # ---- cache of the free sides
 
 

@@ -12,7 +12,7 @@ from time import process_time
 import numpy as np
 
 from ...contact.cells import CellCompliance, make_block
-from ...contact.press_cells import FaceLoading, compute_set_stiffness, press_cells
+from ...contact.press_cells import FaceLoading, PressedCells, compute_set_stiffness, press_cells
 from ...core import Compliance, ContactState, Interface, Outcome, frozen_array
 from ...elasticity.sides import BlockShape
 from ...model.face import compute_face_gap
@@ -28,7 +28,7 @@ from .measures import (
     max_mesh_error_ratio,
 )
 from .press import Patch
-from .values import AcrossValues, EdgeValues, assemble_static_values
+from .values import AcrossValues, EdgeValues, assemble_static_values, estimate_face_peak
 
 FIRST_CELLS = 64  # cells along the longer side of the coarsest grid
 MIN_CELLS_ACROSS = (
@@ -152,28 +152,40 @@ def press_face(
     unworn, notes, seconds = compute_face_gap(patch_model, normal.x, normal.y)
     unloaded = unworn + np.reshape(worn, np.shape(worn) and normal.shape)
     pressed = press_cells(normal, unloaded, make_loading(patch_model), start)
-    sigma = frozen_array(pressed.pressure.ravel())
-    force = sigma * normal.cell_area
-    load = float(force.sum())
-    state = ContactState(
-        sigma_n=sigma,
-        gap=frozen_array(pressed.gap.ravel()),
-        approach=pressed.approach,
-        rotation=patch_model.gap.angle + pressed.tilt_x,
-        load=load,
-        moment=float(force @ pieces.interface.x),
-        outcome=Outcome.DONE if load > 0 else Outcome.NO_CONTACT,
-    )
     return AreaPatch(
         model=patch_model,
         pair=None,
         pieces=pieces,
-        pressure=state,
+        pressure=make_contact_state(pressed, normal, patch_model.gap.angle),
         slip_compliance=_make_slip_compliance(patch_model, pieces.tangential),
         unloaded_gap=frozen_array(unloaded.ravel()),
         notes=notes,
         seconds=seconds | {"press": process_time() - begin - sum(seconds.values())},
         pressed=pressed,
+    )
+
+
+def make_contact_state(pressed: PressedCells, normal: CellCompliance, angle: float) -> ContactState:
+    """Return the contact of flattened cells, with resultants over all pairs.
+
+    Parameters
+    ----------
+    pressed : PressedCells
+    normal : CellCompliance
+        Compliance of the cells.
+    angle : float
+        Tilt along x that the gap contains [rad].
+    """
+    force = pressed.pressure * normal.cell_area
+    load = float(force.sum())
+    return ContactState(
+        sigma_n=frozen_array(pressed.pressure.ravel()),
+        gap=frozen_array(pressed.gap.ravel()),
+        approach=pressed.approach,
+        rotation=angle + pressed.tilt_x,
+        load=load,
+        moment=float(force.sum(axis=0) @ normal.x),
+        outcome=Outcome.DONE if load > 0 else Outcome.NO_CONTACT,
     )
 
 
@@ -186,24 +198,19 @@ def _make_slip_compliance(patch_model: PatchModel, shear: CellCompliance) -> Cel
 
 
 def make_loading(patch_model: PatchModel) -> FaceLoading:
-    """Return load, load line, springs and hardness of a patch."""
+    """Return load, load line, springs and hardness of a patch on cells."""
     loading = patch_model.loading
-    hardness = patch_model.area.hardness or inf
+    face = patch_model.area
+    hardness = (face and face.hardness) or inf
     if loading.load is None:
         return FaceLoading(approach=loading.approach, hardness=hardness)
+    moment = loading.moment
     # A spring of the holder lets the piece rotate about both axes under a load line in the middle.
     spring = loading.rotational_stiffness
-    line_x = 0.0 if spring else None
-    line_y = 0.0 if spring else None
-    if loading.can_rotate:
-        line_x = (
-            loading.offset if loading.line_moment is None else loading.line_moment / loading.load
-        )
-    if loading.across is not None:
-        line_y = loading.across
+    line_y = 0.0 if face and spring and loading.across is None else loading.across
     return FaceLoading(
         load=loading.load,
-        line_x=line_x,
+        line_x=None if moment is None else moment / loading.load,
         line_y=line_y,
         spring_x=spring,
         spring_y=spring,
@@ -246,7 +253,7 @@ def compute_face_values(patch: AreaPatch) -> Values:
         stiffness=compute_stiffness(normal, normal.y[:, None]),
         yielded_fraction=None if hardness is None else (pressure >= hardness).mean(),
     )
-    peak = estimate_peak(pressure)
+    peak = estimate_face_peak(normal.x, normal.y, pressure)
     values = assemble_static_values(pieces.length, area, state, peak, edge_values, across)
     return {name: float(value) for name, value in values.items()}
 
@@ -254,23 +261,6 @@ def compute_face_values(patch: AreaPatch) -> Values:
 def count_boundary_sides(active: np.ndarray) -> int:
     """Return the number of sides between cells in contact, `active` (ny, nx), and others."""
     return sum(np.count_nonzero(np.diff(active, axis=axis)) for axis in (0, 1))
-
-
-def estimate_peak(pressure: np.ndarray) -> float:
-    """Return the largest pressure [Pa] over cells (ny, nx): the vertex of the parabolas through a cell and its neighbours.
-
-    At the boundary of the contact or of the face it is that of the cell.
-    """
-    row, column = np.unravel_index(int(np.argmax(pressure)), pressure.shape)
-    largest = float(pressure[row, column])
-    rise = 0.0
-    for line, place in ((pressure[:, column], row), (pressure[row], column)):
-        if not 0 < place < line.size - 1 or not (line[place - 1] > 0 and line[place + 1] > 0):
-            return largest
-        bend = line[place - 1] - 2 * largest + line[place + 1]
-        slope = (line[place + 1] - line[place - 1]) / 2
-        rise += float(-(slope**2) / (2 * bend)) if bend < 0 else 0.0
-    return largest + rise
 
 
 def is_peak_at_side(pressure: np.ndarray) -> bool:
@@ -462,21 +452,6 @@ def transfer_to_grid(values: np.ndarray, patch: AreaPatch, other: AreaPatch) -> 
     coarse = other.pieces.normal
     along_x = np.array([np.interp(coarse.x, fine.x, row) for row in rows])
     return np.array([np.interp(coarse.y, fine.y, column) for column in along_x.T]).T.ravel()
-
-
-def find_nearest_contact(patch: AreaPatch) -> np.ndarray:
-    """Return for each cell of a face the index (m,) of the nearest cell in contact; its own without contact."""
-    from scipy.ndimage import distance_transform_edt
-
-    active = patch.pressed.pressure > 0
-    if not active.any():
-        return np.arange(active.size)
-    normal = patch.pieces.normal
-    steps = normal.y[1] - normal.y[0], normal.x[1] - normal.x[0]
-    nearest = distance_transform_edt(
-        ~active, sampling=steps, return_distances=False, return_indices=True
-    )
-    return np.ravel_multi_index(tuple(nearest), active.shape).ravel()
 
 
 def _find_start(pressure: np.ndarray, shape: tuple[int, int]) -> np.ndarray | None:

@@ -109,7 +109,7 @@ class StaticEstimates(NamedTuple):
     reasons: Arrays
 
     def make_measures(self, case: int) -> Measures:
-        """Return the measures of one case by name."""
+        """Return the static measures of the case with an index, by name, with errors and reasons of missing values."""
         out = {}
         reason = next((text for text, mask in self.reasons.items() if mask[case]), "")
         for name, value, error, is_limit in zip(

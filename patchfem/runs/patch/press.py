@@ -88,7 +88,7 @@ class Level:
 
     @property
     def is_smooth(self) -> bool:
-        """Whether a nonlinear asperity layer carries pressure at every separation."""
+        """Whether the faces have a nonlinear asperity layer, which transmits pressure across any gap."""
         return self.has_layer and self.model.interface.skin.law != "linear"
 
     @property

@@ -12,13 +12,14 @@ import numpy as np
 from ...contact import row_edges
 from ...contact.cells import make_block
 from ...contact.edges import find_intervals
-from ...contact.press_cells import FaceLoading, press_cells, solve_on_set
+from ...contact.press_cells import press_cells, solve_on_set
 from ...core import NotConverged
 from ...elasticity.lapack import use_one_blas_thread
 from ...elasticity.sides import BlockShape
 from ...model import profile
 from ...model.pieces import make_layer_stacks
 from ..results.patch_rows import HALF_SPACE_SOURCE, Measures, Values, make_measure
+from .area import make_contact_state, make_loading
 from .measures import (
     MIN_CONTACT_EDGE_ERROR_IN_CELLS,
     PRESSURE_PEAK_MEASURES,
@@ -66,19 +67,6 @@ class PointLevel(NamedTuple):
     resolution: Resolution
     n_iterations: int
     has_corner_peak: bool
-
-
-class PointState(NamedTuple):
-    """Resultants of the pressure at equally spaced points, and position of the holder.
-
-    - load, moment: sum [N] and moment [N m] of the forces.
-    - approach, rotation: [m] and [rad]. The rotation includes that of the gap.
-    """
-
-    load: float
-    moment: float
-    approach: float
-    rotation: float
 
 
 def can_use_points(patch_model) -> bool:
@@ -199,7 +187,7 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     """
     pieces = patch_model.pieces
     length = pieces.length
-    shape = BlockShape(length, pieces.width * pieces.pairs, "x")
+    shape = BlockShape(length, pieces.width, "x", pieces.pairs)
     normal, shear = make_block(shape, make_layer_stacks(patch_model), (count, 1), side_level)
     x = normal.x
     half_points = np.linspace(-length / 2, length / 2, 2 * count + 1)
@@ -208,7 +196,7 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     pressed = press_cells(
         normal,
         gap[None],
-        _make_loading(patch_model.loading),
+        make_loading(patch_model),
         None if start is None else np.repeat(start, 2)[None],
         CONTACT_RESIDUAL_TOL,
     )
@@ -217,13 +205,6 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     active = pressure > 0
     if not active.any():
         raise NotConverged("contact: the pieces touch on coarser cells only")
-    force = pressure * normal.cell_area
-    state = PointState(
-        float(force.sum()),
-        float(force @ x),
-        approach=pressed.approach,
-        rotation=patch_model.gap.angle + pressed.tilt_x,
-    )
 
     # The edges between the points follow from the pressure at the points in contact.
     unit = np.ones(count)
@@ -244,6 +225,7 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     # At an end of the interface the pressure is that of the point there.
     peak = estimate_peak_pressure(x, pressure, node_fraction=unit)
     area = normal.cell_area * count
+    state = make_contact_state(pressed, normal, patch_model.gap.angle)
     values = assemble_static_values(length, area, state, peak, edge_values)
     # For dissimilar pieces, the tangential stiffness also depends on the coupling of shear and normal
     # displacement, which is not computed here.
@@ -272,13 +254,3 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
         pressed.n_iterations,
         bool(corner_pressure > MIN_CORNER_PRESSURE_RATIO * pressure.max()),
     )
-
-
-def _make_loading(loading) -> FaceLoading:
-    """Return the loading of a face with a `loading` of a patch, whose moment belongs to a free rotation."""
-    if loading.load is None:
-        return FaceLoading(approach=loading.approach)
-    if loading.moment is None:
-        return FaceLoading(loading.load)
-    line = loading.moment / loading.load
-    return FaceLoading(loading.load, line_x=line, spring_x=loading.rotational_stiffness)

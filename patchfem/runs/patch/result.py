@@ -91,7 +91,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
 
 
 def warn_of_strains(patch_model, pressure: float, approach: float) -> list[str]:
-    """Return warnings on strains beyond the small ones that linear elasticity assumes.
+    """Return warnings if strains are too large for linear elasticity (`MAX_SMALL_STRAIN`).
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def warn_of_strains(patch_model, pressure: float, approach: float) -> list[str]:
     pressure : float
         Largest pressure [Pa] at a node.
     approach : float
-        Approach [m].
+        Distance [m] by which the holders approach each other.
     """
     lowest_young = min(material.young for material in _list_materials(patch_model))
     height = sum(piece.height for piece in patch_model.pieces.both)

@@ -86,6 +86,22 @@ def estimate_peak_pressure(x, sigma, node_fraction=None) -> np.ndarray:
     return peak[..., 0]
 
 
+def estimate_face_peak(x, y, pressure: np.ndarray) -> float:
+    """Estimate the peak pressure [Pa] over cells: the vertex of parabolas along both axes through the largest pressure.
+
+    Parameters
+    ----------
+    x, y : (nx,) and (ny,) ndarray
+        Centres of the cells [m].
+    pressure : (ny, nx) ndarray
+        Pressure of the cells [Pa].
+    """
+    row, column = np.unravel_index(int(np.argmax(pressure)), pressure.shape)
+    rise_x = _vertex_height(x, pressure[row], np.array([column]))
+    rise_y = _vertex_height(y, pressure[:, column], np.array([row]))
+    return float(pressure[row, column] + rise_x[0] + rise_y[0])
+
+
 def _vertex_height(x, sigma, node) -> np.ndarray:
     """Return by how much (..., 1) the parabola through a node and its neighbours rises above its pressure [Pa].
 

@@ -18,7 +18,7 @@ def number_bands(patch) -> np.ndarray:
 
 
 def compute_band_loads(patch) -> np.ndarray:
-    """Return the normal load (b,) [N] on each band of a face."""
+    """Sum the normal forces of the cells in each band of a face: the loads (b,) [N] of the bands."""
     return np.bincount(
         number_bands(patch), patch.normal_stress * patch.pieces.interface.weight, N_YAW_BANDS
     )

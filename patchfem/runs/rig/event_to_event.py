@@ -47,7 +47,8 @@ from .solution import (
 )
 
 SAME_SAMPLE_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
-# Measures of the motion, of the whole run and of its balance are those of the engine also for bands.
+# Groups of measures that are computed in the same way where bands of a face slide apart: those of the motion, of the whole
+# run and of the errors of the solution. The others follow from the averages over the bands.
 BAND_MEASURE_GROUPS = ("curve", "run", "error")
 # Outcomes of motions that the engine ends early, by its status
 EARLY_OUTCOME_BY_STATUS = {

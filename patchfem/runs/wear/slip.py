@@ -16,7 +16,6 @@ from ...response.rows import AMPLITUDE
 from ..bench import bench
 from ..bench.engine import steps_per_cycle
 from ..bench.slides import integrate_steps
-from ..patch import area
 from ..results.patch_rows import Values
 from ..results.result import UNBOUNDED_OUTCOMES
 from ..results.travel import check_pieces_overlap
@@ -388,8 +387,11 @@ def _integrate_node_slip(model, patch, nodes: _Cycle) -> tuple[np.ndarray, float
             along_flank - elastic * path_ratio, points.weight / path_ratio, points.is_closed
         )
     error = points.estimate_reversal_error(sigma * patch.pieces.interface.weight)
-    if model.patch.area is not None:
-        return points.path[area.find_nearest_contact(patch)], error
+    if model.patch.area is not None and patch.pressure.load > 0:
+        from ...surface.areal import fill_nearest
+
+        known = np.where(sigma > 0, points.path, np.nan).reshape(patch.shape)
+        return fill_nearest(known).ravel(), error
     return points.path[_find_nearest_contact(patch.x, sigma > 0)], error
 
 
