@@ -15,7 +15,9 @@ from . import grids, mesh_levels
 from .cases import Batch, CaseMeasures, Cases, make_cases, take_patch
 from .condensed import CondensedPair, condense
 from .measures import (
+    MIN_CONTACT_EDGE_ERROR_IN_CELLS,
     MeshValues,
+    StaticEstimates,
     collect_mesh_values,
     estimate_static_measures,
     max_mesh_error_ratio,
@@ -82,6 +84,30 @@ def join_places(parts: list[ContactPlaces]) -> ContactPlaces:
         crossings[first : first + n_contacts, :n_crossings] = part.crossings
         first += n_contacts
     return ContactPlaces(np.concatenate([part.begins for part in parts]), crossings)
+
+
+def widen_centre_errors(estimates: StaticEstimates, pressed: PressedCases) -> None:
+    """Increase the errors of the centre of pressure and of the moment to those of meshes for many contacts, in place.
+
+    On a mesh that is graded for one contact, the position errors of its two ends cancel. On a mesh for many contacts an end
+    lies anywhere in its cell, and half the error of one end remains. In 280 random crowned blocks the error was at most
+    0.0061 cells where the meshes did not show it.
+
+    Parameters
+    ----------
+    estimates : StaticEstimates
+        Measures of the cases, with the errors that follow from the meshes.
+    pressed : PressedCases
+        The cases on the finest mesh.
+    """
+    is_end = pressed.active[:, 1:] != pressed.active[:, :-1]
+    longest_cell = np.where(is_end, np.diff(pressed.x), 0.0).max(axis=1)
+    error = MIN_CONTACT_EDGE_ERROR_IN_CELLS / 2 * longest_cell
+    row = estimates.names.index
+    load = estimates.values[row("normal_load")]
+    for name, size in (("pressure_centre", error), ("moment", load * error)):
+        errors = estimates.errors[row(name)]
+        np.maximum(errors, size, out=errors)
 
 
 class PressedParts(NamedTuple):
@@ -290,6 +316,8 @@ class _CaseSolver:
         estimates = estimate_static_measures(
             pressed, series, self.tolerance if mesh.is_automatic else None
         )
+        if mesh.is_automatic:
+            widen_centre_errors(estimates, pressed)
         excess = estimates.excess(self.tolerance, length)
         found = CaseMeasures(
             estimates.names,

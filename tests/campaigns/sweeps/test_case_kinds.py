@@ -132,7 +132,7 @@ def check_kind(kind: str, n: int) -> None:
             # The case meets its tolerance, or says why not.
             if np.isfinite(errors[case]):
                 allowed = tolerance * abs(values[case]) + floors[name][case]
-                assert errors[case] <= 1.001 * allowed or row["message"], (kind, case, name)
+                assert errors[case] <= allowed or row["message"], (kind, case, name)
 
             # A value that both have differs by no more than both errors.
             measure = single.measures.get(name)
@@ -147,9 +147,8 @@ def check_kind(kind: str, n: int) -> None:
             allowed = errors[case] + measure.error + 1e-9 * (abs(measure.value) + measure.floor)
             ratios.append(abs(values[case] - measure.value) / allowed)
 
-    # An error is an estimate, which holds for 95 % of the measures and is never far too small.
     assert len(ratios) >= 8 * len(rows)
-    assert np.mean(np.array(ratios) <= 1) >= 0.99 and max(ratios) < 2
+    assert max(ratios) <= 1, kind
 
 
 @pytest.mark.parametrize("kind", FAST)
