@@ -1,8 +1,11 @@
-"""Score the program on a recipe: `python tests/support/brute [--march] [--references] [PART ...]`.
+"""Score the program on a recipe: `python tests/support/brute [--march] [--references] [--shift=N] [PART ...]`.
 
 The recipe is that of refused combinations, or with `--march` that of rigs and benches for the march. Without options every
 scene that the program accepts is run and compared with the references of the recipe. `--references` computes what their
-file lacks, from brute force alone. A PART limits the scenes to those whose seed, kind, effect or law it is.
+file lacks, from brute force alone. A PART limits the scenes to those whose seed, kind, effect or law it is. `--shift=N`
+draws other scenes, whose seeds are higher by N; their references lie in the working folder.
+
+Shifts of campaigns: 20000 (release 3.0, both recipes).
 """
 
 import json
@@ -83,8 +86,11 @@ def print_scores(scenes, path: Path) -> None:
 def main(words: list[str]) -> None:
     """Run the command line."""
     is_march = "--march" in words
+    shift = sum(int(word[8:]) for word in words if word.startswith("--shift="))
     path = MARCH_REFERENCES if is_march else REFERENCES
-    made = march_recipe.make_scenes() if is_march else recipe.make_scenes()
+    if shift:
+        path = Path(f"{path.stem}_{shift}.json")
+    made = march_recipe.make_scenes(shift) if is_march else recipe.make_scenes(shift)
     scenes = select_scenes(made, [word for word in words if not word.startswith("--")])
     if "--references" in words:
         write_references(scenes, path)

@@ -22,10 +22,10 @@ AXIAL, YAW = 143.0, 129.0  # frequencies of its modes [Hz]
 YAW_SLIDE = 0.095  # slide of the patch in its mode "yaw"
 
 
-def make_scenes() -> list[Scene]:
-    """Return all scenes of the recipe."""
-    rigs = [make_rig(FIRST_RIG_SEED + k, k) for k in range(N_RIGS)]
-    return rigs + [make_bench(FIRST_BENCH_SEED + k, k) for k in range(N_BENCHES)]
+def make_scenes(shift: int = 0) -> list[Scene]:
+    """Return all scenes of the recipe, or others like them whose seeds are higher by `shift`."""
+    rigs = [make_rig(FIRST_RIG_SEED + shift + k, k) for k in range(N_RIGS)]
+    return rigs + [make_bench(FIRST_BENCH_SEED + shift + k, k) for k in range(N_BENCHES)]
 
 
 def make_rig(seed: int, number: int) -> Scene:

@@ -65,17 +65,18 @@ class Sizes(NamedTuple):
     patch_length: float
 
 
-def list_combinations() -> list[tuple[str, str, str]]:
+def list_combinations(shift: int = 0) -> list[tuple[str, str, str]]:
     """Return kind of run, effect and law of each scene."""
     combinations = [(*place, law) for place, laws in REFUSED.items() for law in laws]
-    generator = np.random.default_rng(FIRST_SEED)
+    generator = np.random.default_rng(FIRST_SEED + shift)
     more = generator.integers(len(combinations), size=N_SCENES - len(combinations))
     return combinations + [combinations[k] for k in more]
 
 
-def make_scenes() -> list[Scene]:
-    """Return all scenes of the recipe."""
-    return [make_scene(FIRST_SEED + k, *parts) for k, parts in enumerate(list_combinations())]
+def make_scenes(shift: int = 0) -> list[Scene]:
+    """Return all scenes of the recipe, or others like them whose seeds are higher by `shift`."""
+    parts = list_combinations(shift)
+    return [make_scene(FIRST_SEED + shift + k, *part) for k, part in enumerate(parts)]
 
 
 def make_scene(seed: int, kind: str, effect: str, law: str) -> Scene:
