@@ -38,7 +38,6 @@ SCENE_ALSO = (
     "export.fits",  # it writes the fitted scene
     "campaigns.sweeps.case_models",
     "campaigns.rows.condition_models",
-    "campaigns.rows.fit",
 )
 OUTSIDE = {
     "numba": ("*kernels", "compiled", "compiled.*"),

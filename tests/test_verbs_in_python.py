@@ -52,7 +52,7 @@ def test_exact_fit_recovers_friction_of_computed_loop(tmp_path):
     options = pf.FitOptions(hold=["cycle=2"])
     fit = pf.fit(bench, path, options, free=free, out=tmp_path / "fit")
     assert fit["values"]["friction.static"]["value"] == pytest.approx(static, rel=1e-6)
-    assert (tmp_path / "fit/fit.json").is_file() and fit["held"]["rows"] == 5
+    assert (tmp_path / "fit/fit.json").is_file() and fit["held"] == 5
     for arguments, keywords in (
         ((), {"to": path, "hold": "cycle=2"}),
         ((path,), {"hold": ["cycle=2"]}),
@@ -114,11 +114,10 @@ def test_exact_backbone_accepts_amplitudes_in_any_form(amplitudes):
     "scene, given, said",
     [
         (
-            pf.new("bench"),
+            pf.new("wear"),
             {"starts": 3, "leave_out": "cycle"},
-            "leave-out applies only to fits to rows of a rig; leave this option out",
+            "leave-out applies only to fits to rows of a table, not to a worn depth; leave this option out",
         ),
-        (pf.new("wear"), {"hold": "frequency=1 Hz"}, "hold applies only to fits to a loop"),
         (BLOCK, {"starts": 0}, "at least one"),
         (BLOCK, {"hold": "frequency=135 Hz"}, "--hold frequency=135 Hz: none of the rows"),
     ],

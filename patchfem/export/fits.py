@@ -4,20 +4,19 @@ A fit to a loop, to frequency and damping against amplitude, to rows of a rig or
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from .. import __version__
-from ..campaigns.fits.curve import CURVE_EXTENSION_RATIO, FittedCurve
-from ..campaigns.fits.loop import FittedLoop
+from ..campaigns.fits.curve import CURVE_EXTENSION_RATIO, FITTED_NAMES, CurveComparison
+from ..campaigns.fits.loop import LoopComparison
 from ..campaigns.fits.options import FitOptions
-from ..campaigns.fits.problem import FittedKeys, Listener
+from ..campaigns.fits.problem import FittedKeys, Listener, parse_ranges
 from ..campaigns.fits.request import fit_measurement
-from ..campaigns.fits.wear import COEFFICIENT_KEY, FittedCoefficient
-from ..campaigns.rows.fit import FittedRows
+from ..campaigns.fits.rows import RowsComparison
+from ..campaigns.fits.wear import DepthComparison
 from ..disk.atomic_write import write_text
 from ..formatting import format_length, format_number
 from ..model.model import build, write_resolved
@@ -41,15 +40,6 @@ FITTED_SCENE_FILE = "scene.fitted.toml"
 MAX_HEADLINE_VALUES = 2  # further fitted values are in the table only
 MIN_REPORTED_CORRELATION = 0.95  # smallest correlation of two values that the verdict states
 LOOP_FORCE_UNITS = {"force": "N", "friction_ratio": "1"}
-# settings and gains of the sensors of a rig that a scene may leave out
-DEFAULT_SENSOR_SETTINGS = {
-    "reading": "peak",
-    "reading_cutoff": None,
-    "acceleration_gain": 1.0,
-    "displacement_gain": 1.0,
-}
-WEAR_COEFFICIENT_UNIT = "m2 N-1"
-AnyFit = FittedLoop | FittedCurve | FittedRows | FittedCoefficient
 
 
 def compute_answer(
@@ -87,9 +77,10 @@ def compute_answer(
     SceneError, PatchfemError
         For input that cannot be used, before anything is computed.
     """
-    fit = fit_measurement(scene, to, free, options, listener)
-    answer = make_answer(fit, scene)
-    write_text(folder / FITTED_SCENE_FILE, format_fitted_scene(fit, scene, answer.verdict, folder))
+    fitted = fit_measurement(scene, to, parse_ranges(free), options, listener)
+    answer = make_answer(fitted)
+    text = format_fitted_scene(fitted, answer.verdict, folder)
+    write_text(folder / FITTED_SCENE_FILE, text)
     return answer
 
 
@@ -97,35 +88,41 @@ class Parts(NamedTuple):
     """What differs between the kinds of fits.
 
     - residual: sentence on the distance of fit and measurement.
-    - details: further keys of fit.json, among them `measured` (name of the file) and `quantity` (what was measured).
     - scores: quantities of the residual.
     - data: measured and computed values as variables of the answer.
+    - details: further keys of fit.json.
     """
 
     residual: str
-    details: JsonObject
     scores: Quantities
     data: Variables
+    details: JsonObject
 
 
-def make_answer(fit: AnyFit, scene: Scene) -> Answer:
-    """Return the answer of a fit.
-
-    Parameters
-    ----------
-    fit : FittedLoop, FittedCurve, FittedRows or FittedCoefficient
-        Fitted values with their intervals, and the measurement.
-    scene : Scene
-        Scene before the fit.
-    """
-    # Sentence on the residual, details, scores and arrays of this kind of fit.
-    parts = _DESCRIBE_FUNCTIONS[type(fit)](fit)
-    details = {"patchfem": __version__, "title": scene.title, "outcome": "done"}
-    if isinstance(fit, FittedCoefficient):
-        details["values"] = _describe_coefficient(fit)
-    else:
-        details |= _describe_search(fit.keys)
-    details |= parts.details
+def make_answer(fitted: FittedKeys) -> Answer:
+    """Return the answer of a fit from its fitted values and its measurement."""
+    comparison = fitted.comparison
+    parts = _DESCRIBE_FUNCTIONS[type(comparison)](fitted)
+    scene = fitted.keys.scene
+    fit = fitted.fit
+    details = {
+        "patchfem": __version__,
+        "title": scene.title,
+        "outcome": str(fit.outcome),
+        "measured": comparison.path.name,
+        **_describe_values(fitted),
+        "evaluations": fit.counts.evaluations,
+        "failures": fit.counts.failures,
+        "descents_agreed": fit.n_best,
+        "rows": (~fitted.held_out).sum(),
+        "effective_rows": fit.intervals.rows,
+        "held": fitted.held_out.sum(),
+        "warnings": fitted.warnings,
+        "notes": fitted.notes,
+        "seconds": round(fitted.seconds, 6),
+        "scores": {name: score.value for name, score in parts.scores.items()},
+        **parts.details,
+    }
 
     # fitted values; without an interval they have the reason
     measures = {}
@@ -137,7 +134,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
 
     # the verdict names the most correlated pair of values if their correlation is strong
     verdict = [_make_headline(details, measures), parts.residual]
-    pairs = _collect_pairs(details.get("correlation", ()), list(measures))
+    pairs = _collect_pairs(fit.intervals.correlation, list(measures))
     if pairs and abs(pairs["correlation"].values[0]) >= MIN_REPORTED_CORRELATION:
         names = pairs["pair"].values[0].replace(", ", " and ")
         verdict.append(
@@ -150,7 +147,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
         verdict=tuple(verdict),
         quantities=measures | parts.scores,
         data=parts.data | pairs,
-        remarks=Remarks(tuple(details["warnings"]), tuple(details.get("notes", ()))),
+        remarks=Remarks(tuple(fitted.warnings), tuple(fitted.notes)),
         details=details,
         origin=make_origin(find_source(build(scene)), "fit"),
     )
@@ -162,12 +159,9 @@ def _make_headline(details: JsonObject, measures: Quantities) -> str:
     text = ", ".join(f"{key} = {format_quantity(key, one)}" for key, one in named)
     if len(measures) > len(named):
         text += f" and {len(measures) - len(named)} more"
-    source = details["measured"]
-    if source == "--to":  # a depth given with the command
-        source = details["quantity"]
     if details["outcome"] != "done":
-        return f"The fit to {source} did not converge; best values so far: {text}."
-    return f"Fitted to {source}: {text}."
+        return f"The fit to {details['measured']} did not converge; best values so far: {text}."
+    return f"Fitted to {details['measured']}: {text}."
 
 
 def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Variables:
@@ -181,18 +175,12 @@ def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Variables:
     return make_columns("pair", {"pair": (texts, ""), "correlation": (values[order], "1")})
 
 
-def _describe_coefficient(fit: FittedCoefficient) -> dict[str, JsonObject]:
-    """Return {key of the wear coefficient: value, unit, interval and bounds}, the fitted values of fit.json."""
-    value = {"value": fit.value, "unit": WEAR_COEFFICIENT_UNIT, "interval": [fit.low, fit.high]}
-    return {COEFFICIENT_KEY: value | {"bounds": [fit.bounds.low, fit.bounds.high]}}
-
-
-def _describe_search(keys: FittedKeys) -> JsonObject:
-    """Return what fit.json says of a search: values with intervals, outcome, counts, and what the data leave open."""
-    fit = keys.fit
+def _describe_values(fitted: FittedKeys) -> JsonObject:
+    """Return the fitted values with intervals, and what the data leave open, as objects of fit.json."""
+    fit = fitted.fit
     intervals = fit.intervals
     values = {}
-    for k, bound in enumerate(keys.ranges):
+    for k, bound in enumerate(fitted.keys.ranges):
         ends = intervals.ends[k].tolist()
         values[bound.key] = {
             "value": fit.values[k],
@@ -206,37 +194,28 @@ def _describe_search(keys: FittedKeys) -> JsonObject:
 
     # combinations of values that the data do not determine, without the values that do not take part
     unknown = [dict(zip(values, row, strict=True)) for row in intervals.unknown.tolist()]
-    return {
-        "outcome": str(keys.outcome),
-        "values": values,
-        "unknown": [{name: part for name, part in row.items() if part} for row in unknown],
-        "correlation": intervals.correlation,
-        "evaluations": fit.counts.evaluations,
-        "failures": fit.counts.failures,
-        "descents_agreed": fit.n_best,
-        "warnings": keys.warnings,
-        "seconds": round(keys.seconds, 6),
-    }
+    unknown = [{name: part for name, part in row.items() if part} for row in unknown]
+    return {"values": values, "unknown": unknown, "correlation": intervals.correlation}
 
 
-def describe_loop_fit(fit: FittedLoop) -> Parts:
+def describe_loop_fit(fitted: FittedKeys) -> Parts:
     """Return what the answer of a fit to a friction loop contains: residuals, loops and their variables."""
-    loop = fit.loop
+    comparison = fitted.comparison
+    loop = comparison.loop
+    held_out = fitted.held_out
     unit = LOOP_FORCE_UNITS[loop.quantity]
-    peak = np.abs(loop.reading).max()
-    n_rows = int((~fit.held_out).sum())
+    fraction = fitted.fit.rms / np.abs(loop.reading).max()
     scores = {
-        "residual_rms": Quantity(fit.rms, unit),
-        "residual_fraction": Quantity(fit.rms / peak),
+        "residual_rms": Quantity(fitted.fit.rms, unit),
+        "residual_fraction": Quantity(fraction),
     }
 
     text = format_quantity("residual_rms", scores["residual_rms"])
-    share = f"{100 * fit.rms / peak:.2g} %"
-    residual = f"The residual of {n_rows} rows is {text} rms, {share} of the peak."
+    residual = f"The residual of {np.count_nonzero(~held_out)} rows is {text} rms, {100 * fraction:.2g} % of the peak."
     if loop.quantity == "force":
         # the steps between two fitted rows
-        is_used = ~(fit.held_out[1:] | fit.held_out[:-1])
-        pairs = np.array([loop.reading, fit.model])
+        is_used = ~(held_out[1:] | held_out[:-1])
+        pairs = np.array([loop.reading, fitted.computed])
         works = (pairs[:, 1:] + pairs[:, :-1]) / 2 @ (np.diff(loop.displacement) * is_used)
         scores["work_measured"], scores["work_fitted"] = (Quantity(work, "J") for work in works)
         share = format_number(100 * works[1] / works[0], 4)
@@ -246,150 +225,96 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
     columns = {
         "slide": (loop.displacement, "m"),
         loop.quantity: (loop.reading, unit),
-        "fitted": (fit.model, unit),
-        "residual": (np.where(fit.held_out, np.nan, fit.model - loop.reading), unit),
+        "fitted": (fitted.computed, unit),
+        "residual": (np.where(held_out, np.nan, fitted.computed - loop.reading), unit),
         "row": (np.arange(loop.reading.size), "1"),
-        "held": (fit.held_out.astype(np.int8), ""),
+        "held": (held_out.astype(np.int8), ""),
     }
     if loop.time is not None:
         columns["time"] = (loop.time, "s")
-    held_out = None
-    if fit.held_out_rms is not None:  # these rows are drawn and scored apart
-        held_out = {"rows": fit.held_out.sum(), "rms": fit.held_out_rms}
-        scores["held_out_rms"] = Quantity(fit.held_out_rms, unit)
-        columns["held_out"] = (np.where(fit.held_out, loop.reading, np.nan), unit)
-
-    details = {
-        "measured": loop.path.name,
-        "quantity": loop.quantity,
-        "unit": unit,
-        "rows": n_rows,
-        "effective_rows": fit.keys.fit.intervals.rows,
-        "rms": fit.rms,
-        "held": held_out,
-        "peak": peak,
-        "step_error": fit.step_error,
-        "steps_between_rows": fit.steps_per_row,
-    }
-    return Parts(residual, details, scores, make_columns("row", columns))
+    if held_out.any():  # these rows are drawn and scored apart
+        scores["held_out_rms"] = Quantity(fitted.compute_rms(held_out), unit)
+        columns["held_out"] = (np.where(held_out, loop.reading, np.nan), unit)
+    details = {"step_error": comparison.step_error, "steps_between_rows": comparison.steps_per_row}
+    return Parts(residual, scores, make_columns("row", columns), details)
 
 
-def describe_curve_fit(fit: FittedCurve) -> Parts:
+def describe_curve_fit(fitted: FittedKeys) -> Parts:
     """Return what the answer of a fit to measured frequency and damping against amplitude contains."""
-    measured = fit.measured
-    n_rows = measured.amplitude.size
-    errors = 2 * measured.error  # half the width of a 95 % interval
+    comparison = fitted.comparison
+    beyond = comparison.extrapolate(fitted.fit)
 
     # measured and fitted values, and the curve that extends beyond the measured amplitudes
-    columns = {"amplitude": (measured.amplitude, "m")}
-    curve = {"curve_amplitude": (fit.beyond[0], "m")}
-    rms = {}
-    for k, (name, unit) in enumerate((("frequency", "Hz"), ("damping", "1"))):
-        value = measured.value[k]
-        distance = fit.model[k] - value
-        rms[name] = np.sqrt(np.mean((distance / value) ** 2))
+    columns = {"amplitude": (comparison.amplitude, "m")}
+    curve = {"curve_amplitude": (beyond[0], "m")}
+    scores = {}
+    for k, (name, unit) in enumerate(zip(FITTED_NAMES, ("Hz", "1"))):
+        row = comparison.parts == k
+        value = comparison.measured[row]
+        distance = fitted.computed[row] - value
+        errors = 2 * comparison.deviation[row]  # half the width of a 95 % interval
+        is_used = ~fitted.held_out[row]
+        rms = np.sqrt(np.mean((distance / value)[is_used] ** 2))
+        scores[f"{name}_residual_rms"] = Quantity(rms)
         columns |= {
             name: (value, unit),
-            f"{name}_error": (errors[k], unit),
-            f"{name}_fitted": (fit.model[k], unit),
-            f"{name}_residual": (distance / errors[k], "1"),
+            f"{name}_error": (errors, unit),
+            f"{name}_fitted": (fitted.computed[row], unit),
+            f"{name}_residual": (distance / errors, "1"),
         }
-        curve[f"curve_{name}"] = (fit.beyond[k + 1], unit)
-        curve[f"curve_{name}_error"] = (fit.beyond[k + 3], unit)
+        curve[f"curve_{name}"] = (beyond[k + 1], unit)
+        curve[f"curve_{name}_error"] = (beyond[k + 3], unit)
+    columns["held"] = (fitted.held_out[comparison.parts == 0].astype(np.int8), "")
 
-    percent = {name: f"{100 * value:.2g} %" for name, value in rms.items()}
+    frequency, damping = (f"{100 * score.value:.2g} %" for score in scores.values())
     residual = (
-        f"At {n_rows} amplitudes the residual is {percent['frequency']} rms of the frequency and "
-        f"{percent['damping']} of the damping ratio, by method {fit.method}."
+        f"At {np.count_nonzero(is_used)} amplitudes the residual is {frequency} rms of the frequency and {damping} of the "
+        f"damping ratio, by method {comparison.method}."
     )
-    if measured.assumed.any():
+    if comparison.is_assumed.any():
         residual += " The errors of the measured values are their scatter around the fit."
-
-    details = {
-        "measured": fit.path.name,
-        "quantity": "decay",
-        "method": fit.method,
-        "rows": n_rows,
-        "rms": rms,
-        "notes": fit.notes,
-        "evaluations": fit.n_computed,
-    }
-    scores = {f"{name}_residual_rms": Quantity(value) for name, value in rms.items()}
     data = make_columns("row", columns) | make_columns("curve_amplitude", curve)
-    return Parts(residual, details, scores, data)
+    return Parts(residual, scores, data, {"method": comparison.method})
 
 
-def describe_rows_fit(fit: FittedRows) -> Parts:
+def describe_rows_fit(fitted: FittedKeys) -> Parts:
     """Return what the answer of a fit to a table of measured responses contains.
 
     Its scores are root mean squares of ln(computed/measured).
     """
-    search = fit.keys.fit
-    scores = fit.compute_scores()
-    totals = {name: score["all"] for name, score in scores.items() if score is not None}
+    comparison = fitted.comparison
+    cells = comparison.cells
+    search = fitted.fit
+    all_scores = comparison.compute_scores(fitted)
+    totals = {name: score["all"] for name, score in all_scores.items() if score is not None}
+    if not cells.unstable.any():
+        del totals["stable"]
     texts = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in totals.items() if value]
     residual = (
         f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.descent_rms.size} starts "
         "led to within 1 % of the best."
     )
-
-    rows, data = _collect_rows(fit)
-    details = {
-        "measured": fit.cells.path.name,
-        "quantity": "rows",
-        "scores": scores,
-        # without the rows that were unstable in the test
-        "scores_stable": fit.compute_scores(only_stable=True),
-        "reading": _describe_instrument(fit),
-        "readings": (~fit.held_out).sum(),
-        "held": fit.held_out.sum(),
-        "rms": fit.keys.fit.rms,
-        "rows": rows,
-        "motions": fit.n_motions,
-        "notes": [fit.advice] if fit.advice else [],
-    }
     scores = {f"score_{name}": Quantity(value) for name, value in totals.items()}
-    return Parts(residual, details, scores, data)
+    return Parts(residual, scores, _collect_rows(fitted), {"sensor_scores": all_scores})
 
 
-def _describe_instrument(fit: FittedRows) -> JsonObject:
-    """Return settings and gains of the sensors by name: fitted values, else those of the scene, else defaults."""
-    instrument = {
-        name: getattr(fit.instrument, name, default)
-        for name, default in DEFAULT_SENSOR_SETTINGS.items()
-    }
-    for bound, value in zip(fit.keys.ranges, fit.keys.fit.values, strict=True):
-        table, _, key = bound.key.partition(".")
-        if table == "measured":
-            instrument[key] = value
-    return instrument
-
-
-def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
-    """Return measured and computed readings of each row, twice: as objects of fit.json, and as arrays with their ratios."""
-    cells = fit.cells
-    entries = [asdict(row) for row in cells.rows]
-    is_held = np.zeros(len(entries), bool)
-    is_held[cells.row[fit.held_out]] = True
-    columns = {
-        name: ([row[name] for row in entries], unit)
-        for name, unit in (("frequency", "Hz"), ("input", "m s-2"), ("flag", ""))
-    }
-    columns["held"] = (is_held.astype(np.int8), "")
+def _collect_rows(fitted: FittedKeys) -> Variables:
+    """Return measured and computed readings of each row and their ratios."""
+    cells = fitted.comparison.cells
+    rows = cells.rows
+    is_held = np.zeros(len(rows), bool)
+    is_held[cells.row[fitted.held_out]] = True
+    columns = {"held": (is_held.astype(np.int8), "")}
+    for name, unit in (("frequency", "Hz"), ("input", "m s-2"), ("flag", "")):
+        columns[name] = ([getattr(row, name) for row in rows], unit)
 
     data = {}
-    for part, (name, unit) in enumerate(SENSOR_UNITS.items()):
+    for name, unit in SENSOR_UNITS.items():
         # a row without a reading has no computed one
         is_kind = cells.is_acceleration == (name == "acceleration")
-        places = cells.row[is_kind]
-        computed = np.full(len(entries), np.nan)
-        computed[places] = fit.computed[part, cells.condition[is_kind]]
-        held_out = np.full(len(entries), None)
-        held_out[places] = fit.held_out[is_kind]
-        measured = np.array([row[name] for row in entries], float)
-        for row, number, is_held_out in zip(entries, computed, held_out, strict=True):
-            row[name] = {"measured": row[name], "computed": number, "held": is_held_out}
-
+        measured, computed = np.full((2, len(rows)), np.nan)
+        measured[cells.row[is_kind]] = cells.measured[is_kind]
+        computed[cells.row[is_kind]] = fitted.computed[is_kind]
         ratio = computed / np.where(measured > 0, measured, np.nan)
         columns |= {name: (measured, unit), f"computed_{name}": (computed, unit)}
         columns[f"{name}_ratio"] = (ratio, "1")
@@ -400,102 +325,75 @@ def _collect_rows(fit: FittedRows) -> tuple[list[JsonObject], Variables]:
 
     # codes by which the charts colour the rows
     uses = []
-    for row, is_held_out in zip(entries, is_held, strict=True):
-        unstable = ", unstable in the test" * ("U" in row["flag"])
+    for row, is_held_out in zip(rows, is_held, strict=True):
+        unstable = ", unstable in the test" * ("U" in row.flag)
         uses.append(f"{'held out' if is_held_out else 'fitted'}{unstable}")
-    drives = [f"{row['frequency']:.6g} Hz" for row in entries]
+    drives = [f"{row.frequency:.6g} Hz" for row in rows]
     codes = {"use": encode_texts("row", uses), "drive": encode_texts("row", drives)}
-    return entries, codes | data | make_columns("row", columns)
+    return codes | data | make_columns("row", columns)
 
 
-def describe_wear_fit(fit: FittedCoefficient) -> Parts:
+def describe_wear_fit(fitted: FittedKeys) -> Parts:
     """Return what the answer of a wear coefficient that was fitted to a measured depth contains."""
-    measured = fit.measured
-    ends = {"value": measured.value, "low": measured.low, "high": measured.high}
-    name = measured.name.replace("_", " ")
-    text = format_quantity(measured.name, Quantity(unit="m", **ends))
+    comparison = fitted.comparison
+    depth = comparison.depth
+    unit = fitted.keys.ranges[0].unit
+    points = {
+        "coefficient": (fitted.fit.values, unit),
+        "depth": ([depth.value], "m"),
+        "depth_low": ([depth.low], "m"),
+        "depth_high": ([depth.high], "m"),
+    }
 
-    points = {"coefficient": ([fit.value], WEAR_COEFFICIENT_UNIT)}
-    for end, value in ends.items():
-        points[f"depth_{end}".removesuffix("_value")] = ([value], "m")
     # the computed curve is drawn a little beyond the interval of the coefficient
-    coefficients, depths = fit.curve[:, fit.curve[0] <= CURVE_EXTENSION_RATIO * fit.high]
+    coefficients, depths = comparison.curve
+    is_drawn = coefficients <= CURVE_EXTENSION_RATIO * np.nanmax(fitted.fit.intervals.ends)
     curve = {
-        "curve_coefficient": (coefficients, WEAR_COEFFICIENT_UNIT),
-        "curve_depth": (depths, "m"),
+        "curve_coefficient": (coefficients[is_drawn], unit),
+        "curve_depth": (comparison.factor * depths[is_drawn], "m"),
     }
 
     # what the interval of the coefficient contains
-    warnings = []
     parts = []
-    if measured.low < measured.high:
+    if depth.low < depth.high:
+        name = depth.name.replace("_", " ")
+        text = format_quantity(depth.name, Quantity(depth.value, "m", None, depth.low, depth.high))
         parts.append(f"that of the measured {name}, {text},")
-    else:
-        warnings.append(
-            f"{measured.name} was given without an interval, so that of the coefficient does not contain the error of the "
-            f'measurement; give both ends, such as "{measured.name}=2.5 um..3.5 um"'
-        )
-    error = fit.model.error
-    if error is not None:
-        parts.append(f"the numerical error of the computed depth, {format_length(error, 2)}")
-    else:
-        warnings.append(
-            "the numerical error of the computed depth is unknown, so the interval of the coefficient does not contain it"
-        )
-
-    # The curve ends at the high bound of the coefficient, and so does the interval.
-    max_depth = fit.curve[1][-1]
-    if measured.high + (error or 0.0) > max_depth:
-        warnings.append(
-            f"the measured {name} with all errors reaches beyond {format_length(max_depth, 4)}, the depth with the high "
-            "bound of the coefficient, at which the interval of the coefficient ends; raise the high bound, unless the "
-            "coating is worn through"
-        )
-    residual = f"The interval contains {' and '.join(parts)}." if parts else ""
-
-    details = {
-        "measured": Path(measured.source).name,
-        "quantity": measured.name,
-        "runs": fit.runs,
-        "model": fit.model.value,
-        "model_error": error,
-        "data": ends,
-        "warnings": warnings,
-    }
-    return Parts(
-        residual or f"The computed depth is {format_length(fit.model.value)}.",
-        details,
-        {"fitted_depth": Quantity(fit.model.value, "m", error)},
-        make_columns("point", points) | make_columns("curve_coefficient", curve),
-    )
+    if comparison.error is not None:
+        error = format_length(comparison.error, 2)
+        parts.append(f"the numerical error of the computed depth, {error}")
+    computed = fitted.computed[0]
+    residual = f"The computed depth is {format_length(computed)}."
+    if parts:
+        residual = f"The interval contains {' and '.join(parts)}."
+    scores = {"fitted_depth": Quantity(computed, "m", comparison.error)}
+    data = make_columns("point", points) | make_columns("curve_coefficient", curve)
+    measured = comparison.path.name.replace("--to", depth.name)
+    details = {"measured": measured, "model_error": comparison.error}
+    return Parts(residual, scores, data, details)
 
 
 _DESCRIBE_FUNCTIONS = {
-    FittedLoop: describe_loop_fit,
-    FittedCurve: describe_curve_fit,
-    FittedRows: describe_rows_fit,
-    FittedCoefficient: describe_wear_fit,
+    LoopComparison: describe_loop_fit,
+    CurveComparison: describe_curve_fit,
+    RowsComparison: describe_rows_fit,
+    DepthComparison: describe_wear_fit,
 }
 
 
-def format_fitted_scene(fit: AnyFit, scene: Scene, verdict: Sequence[str], folder: Path) -> str:
+def format_fitted_scene(fitted: FittedKeys, verdict: Sequence[str], folder: Path) -> str:
     """Return the text of the fitted scene, in SI units with all defaults, below comments that say what was fitted.
 
     Parameters
     ----------
-    fit : FittedLoop, FittedCurve, FittedRows or FittedCoefficient
+    fitted : FittedKeys
         Fitted values.
-    scene : Scene
-        Scene before the fit.
     verdict : sequence of str
         Sentences of the answer.
     folder : Path
         Folder to which the paths of the fitted scene are relative.
     """
-    if isinstance(fit, FittedCoefficient):
-        fitted = add_sets(scene, [fit.bounds.format_assignment(fit.value)])
-    else:
-        fitted = fit.keys.fitted_scene()
-    model = build(fitted)
-    text = write_resolved(fitted, model, find_source(model).writer.joint, folder)
+    scene = add_sets(fitted.keys.scene, fitted.sets)
+    model = build(scene)
+    text = write_resolved(scene, model, find_source(model).writer.joint, folder)
     return "\n".join([*(f"# {sentence}" for sentence in verdict), "", text])

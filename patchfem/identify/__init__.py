@@ -10,7 +10,6 @@ PUBLIC = {
     "least_squares": (
         "Fit",
         "Problem",
-        "Search",
     ),
     "measured_modes": (
         "compute_decay_curve",

@@ -5,6 +5,7 @@ The profile of the sum of squares is used if the residual is not linear over the
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cache
 from typing import NamedTuple
 
@@ -33,6 +34,19 @@ N_FIRST_STEPS_TO_BOUND = 64
 PROFILE_END_TOL = 1e-3  # tolerance of the end of a profile interval, relative to its half-width
 # Growth at a point without a residual, relative to that at the end of the interval
 MAX_SQUARES_GROWTH_RATIO = 1e6
+
+
+class IntervalKind(StrEnum):
+    """Assumption on the errors of the data from which confidence intervals are computed.
+
+    - ROWS: the rows are independent.
+    - SERIES: the rows are a time series, in which correlated neighbours count as fewer rows.
+    - KNOWN: each row is divided by its standard deviation, which is known.
+    """
+
+    ROWS = "rows"
+    SERIES = "series"
+    KNOWN = "known"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -74,7 +88,7 @@ class _Minimum(NamedTuple):
     - model: residual as a function on the unit cube.
     - u: minimum (n,) in the unit cube.
     - cost: sum of squares at the minimum.
-    - growth: relative growth of the sum of squares at the ends of a 95 % interval.
+    - growth: growth of the sum of squares at the ends of a 95 % interval.
     """
 
     model: UnitCubeResidual
@@ -90,7 +104,7 @@ class _Minimum(NamedTuple):
         for end in (self.u - direction, self.u + direction):
             if (end < 0).any() or (end > 1).any():
                 return False
-            growth = self.model.sum_of_squares(end) / self.cost - 1
+            growth = self.model.sum_of_squares(end) - self.cost
             if not abs(growth / self.growth - 1) <= MAX_NONLINEARITY:
                 return False
         return True
@@ -126,7 +140,7 @@ class _Minimum(NamedTuple):
             descent = descend(self.model, point, others)
             if descent.cost < np.inf:
                 nearby = descent.u
-            growth = max(descent.cost / self.cost - 1, 0.0) / self.growth
+            growth = max(descent.cost - self.cost, 0.0) / self.growth
             return np.sqrt(min(growth, MAX_SQUARES_GROWTH_RATIO)) - 1
 
         # the step is doubled until the end is bracketed
@@ -143,7 +157,7 @@ class _Minimum(NamedTuple):
 
 
 def compute_intervals(
-    model: UnitCubeResidual, u: np.ndarray, cost: float, *, is_series: bool
+    model: UnitCubeResidual, u: np.ndarray, cost: float, kind: str
 ) -> FitIntervals:
     """Compute the 95 % confidence intervals of the parameters of a least-squares fit.
 
@@ -157,30 +171,34 @@ def compute_intervals(
         Minimum in the unit cube.
     cost : float
         Sum of squares at the minimum.
-    is_series : bool
-        Whether the rows are a time series, in which correlated rows count as fewer.
+    kind : str
+        Value of `IntervalKind`.
 
     Returns
     -------
     FitIntervals
     """
     n = u.size
-    rows = estimate_effective_rows(model(u)) if is_series else model.rows
+    rows = estimate_effective_rows(model(u)) if kind == IntervalKind.SERIES else model.rows
     dof = max(rows - n, 1)
     # An exact fit has the cost of its round-off, so that variances are not zero.
     cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
+    variance = cost / dof
+    if kind == IntervalKind.KNOWN:
+        dof = np.inf
+        variance = 1.0
     quantile = stdtrit(dof, 0.975)
-    minimum = _Minimum(model, u, cost, quantile**2 / dof)
+    minimum = _Minimum(model, u, cost, quantile**2 * variance)
 
-    # Covariance (J^T J)^-1 cost/dof of the parameters that have an effect and lie on no bound. A parameter is unknown
-    # if a direction without effect on the residual contains it.
+    # Covariance (J^T J)^-1 times the variance of a row, of the parameters that have an effect and lie on no bound. A
+    # parameter is unknown if a direction without effect on the residual contains it.
     jacobian = model.jacobian(u, range(n))
     norms = np.linalg.norm(jacobian, axis=0)
     has_effect = norms > MIN_RESIDUAL_EFFECT * model.largest * np.sqrt(model.rows)
     free = np.flatnonzero((u > 0) & (u < 1) & has_effect)
     inverse, null_vectors = _invert_normal_matrix(jacobian[:, free], norms[free])
     covariance = np.full((n, n), np.nan)
-    covariance[np.ix_(free, free)] = inverse * cost / dof
+    covariance[np.ix_(free, free)] = inverse * variance
     is_unknown = np.zeros(n, bool)
     is_unknown[free] = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
 

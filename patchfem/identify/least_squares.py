@@ -1,21 +1,21 @@
 """Least squares with bounds: fitted parameters, 95 % intervals, and undetermined directions.
 
 The parameters are mapped to the unit cube, on a logarithmic scale if the bounds are positive and wide. Local
-searches (descents) start from several points, the same in every call. The confidence intervals are those of
-the linearized problem, with Student's t distribution for (rows - parameters) degrees of freedom. In a time
-series, only the independent rows count (`correlation`). If the residual is not linear over an interval, or
-the parameter lies on a bound, the interval follows from the profile of the sum of squares.
+searches (descents) start from several points, the same in every call. If they are quick, they use one-sided
+differences, and the best of them is continued with central ones. The confidence intervals are those of the linearized
+problem, with Student's t distribution for (rows - parameters) degrees of freedom. In a time series, only the independent
+rows count (`correlation`). If the residual is not linear over an interval, or the parameter lies on a bound, the interval
+follows from the profile of the sum of squares.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
 from ..core import NotConverged, Outcome
 from .descent import Descent, descend
-from .intervals import FitIntervals, compute_intervals
+from .intervals import FitIntervals, IntervalKind, compute_intervals
 from .space import (
     SearchCounts,
     UnitCubeResidual,
@@ -31,19 +31,6 @@ SAME_MINIMUM_RATIO = 1.01
 NEAR_BOUND_FRACTION = 1e-3
 # Number of trial points per parameter for the choice of the starting points.
 N_TRIALS_PER_VALUE = 8
-
-
-class IntervalKind(StrEnum):
-    """Assumption on the errors of the data from which confidence intervals are computed.
-
-    - ROWS: the rows are independent.
-    - SERIES: the rows are a time series, in which correlated neighbours count as fewer rows.
-    - NONE: no intervals are computed, and no parameter is tried on a bound.
-    """
-
-    ROWS = "rows"
-    SERIES = "series"
-    NONE = ""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -73,11 +60,6 @@ class Fit:
         """Number of descents that ended within 1 % of the smallest residual."""
         return _count_best(self.descent_rms, self.descent_rms.min())
 
-    def count_earlier_search(self, earlier: "Fit") -> "Fit":
-        """Return this fit with evaluations and descents of an earlier search, which gave its only start."""
-        counts = earlier.counts.add(self.counts)
-        return replace(self, counts=counts, descent_rms=earlier.descent_rms)
-
     def widen(self, changes, bounds) -> "Fit":
         """Return this fit with intervals that contain the effect of numerical errors of the model.
 
@@ -104,119 +86,155 @@ class Fit:
         return replace(self, intervals=widened)
 
 
-@dataclass(frozen=True, slots=True)
-class Search:
-    """Starting points of a search, and what accompanies its descents.
-
-    - starts: number of descents. With one, only that from the start of the problem, unless the evaluation there fails.
-    - seed: seed of random starting points, for a residual that is expensive to evaluate: derivatives are one-sided
-      differences, and the best descent is continued with central ones. None: the start of the problem and the best of
-      some trial points.
-    - before_descent, report: called before and after each descent.
-    """
-
-    starts: int
-    seed: int | None = None
-    before_descent: Callable[[], None] = lambda: None
-    report: Callable[[], None] = lambda: None
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class Problem:
     """Least-squares problem whose residual is a function of n bounded parameters.
 
-    - residual: function of the parameters (n,) that returns the residual (r,), each row divided by its
-      standard deviation. An evaluation fails if it raises a PatchfemError or is not finite.
-    - low, high: bounds (n,).
-    - start: parameters (n,) from which the first descent starts, NaN for the middle of a range; None without them.
+    Parameters
+    ----------
+    residual : callable
+        Function of the parameters (n,) that returns the residual (r,). An evaluation fails if it raises a PatchfemError or
+        is not finite.
+    low, high : sequence of float
+        Bounds (n,).
+    start : sequence of float, optional
+        Parameters (n,) from which the first descent starts, NaN for the middle of a range.
+    earlier : Fit, optional
+        Result of an earlier search, which is the start instead; its descents and evaluations count in the result.
+    before_start : callable, optional
+        Called before each starting point and each descent.
     """
 
-    residual: Callable[[np.ndarray], np.ndarray]
-    low: Sequence
-    high: Sequence
-    start: Sequence | None = None
+    def __init__(
+        self,
+        residual: Callable[[np.ndarray], np.ndarray],
+        low: Sequence,
+        high: Sequence,
+        start: Sequence | None = None,
+        earlier: Fit | None = None,
+        before_start: Callable[[], None] = lambda: None,
+    ):
+        self.model = UnitCubeResidual(residual, make_search_space(low, high))
+        self.start = start
+        self.earlier = earlier
+        if earlier is not None:
+            self.start = earlier.values
+            self.model.counts = earlier.counts
+        self.before_start = before_start
 
     def solve(self, max_descents: int = 3, interval_kind: str = IntervalKind.ROWS) -> Fit:
+        """Minimize the sum of squares of the residual (`search`), and compute intervals (`add_intervals`)."""
+        return self.add_intervals(self.search(max_descents), interval_kind)
+
+    def search(
+        self,
+        max_descents: int,
+        *,
+        is_quick: bool = False,
+        report: Callable[[], None] = lambda: None,
+    ) -> Fit:
         """Minimize the sum of squares from the start of the problem and the best of some trial points.
-
-        `max_descents` is the largest number of descents; the rest is as in `search`.
-        """
-        return self.search(Search(max_descents), interval_kind)
-
-    def search(self, search: Search, interval_kind: str = IntervalKind.ROWS) -> Fit:
-        """Minimize the sum of squares of the residual within the bounds.
 
         Parameters
         ----------
-        search : Search
-            Starting points and callbacks of the search.
-        interval_kind : str
-            Value of `IntervalKind`.
+        max_descents : int
+            Largest number of descents. With one, only that from the start of the problem, unless the evaluation there
+            fails.
+        is_quick : bool
+            Whether the descents but the last use a looser tolerance and one-sided differences.
+        report : callable
+            Called after each descent.
 
         Returns
         -------
         Fit
+            Without intervals.
 
         Raises
         ------
         ValueError
-            If the bounds are invalid, or if there are fewer rows than parameters.
+            If there are fewer rows than parameters.
         NotConverged
             If the evaluations at all starting points fail.
         """
-        n = len(self.low)
-        is_random = search.seed is not None
-        space = make_search_space(self.low, self.high)
-        model = UnitCubeResidual(self.residual, space, is_expensive=is_random)
-        if is_random:
-            starts = list(np.random.default_rng(search.seed).random((search.starts, n)))
-        else:
-            starts = self._choose_starts(model, search.starts)
-            if model.rows < n:
-                raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
+        model = self.model
+        starts = self._choose_starts(max_descents)
+        n = starts[0].size
+        if model.rows < n:
+            raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
 
         ends = []
         for start in starts:
-            search.before_descent()
-            end = descend(model, start, range(n))
-            ends.append(end)
-            search.report()
+            self.before_start()
+            ends.append(descend(model, start, range(n), is_quick=is_quick))
+            report()
             # a fit that is exact to round-off is not repeated
-            if not is_random and end.cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
+            if ends[-1].cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
                 break
         best = min(ends, key=lambda end: end.cost)
-        if not np.isfinite(best.cost):
-            raise NotConverged(
-                f"fit: all {len(ends)} searches failed; the first failed for this reason: {model.counts.reason}"
-            )
-        descent_rms = np.sqrt([end.cost / max(end.rows, 1) for end in ends])
-        if is_random:
-            # the best descent is continued with central differences
-            search.before_descent()
-            model.is_expensive = False
+        descent_rms = np.sqrt([end.cost / end.rows for end in ends])
+        if is_quick:
+            self.before_start()
             best = descend(model, best.u, range(n))
-            model.is_expensive = True
-        return _assemble_fit(model, best, descent_rms, interval_kind)
+        rms = np.sqrt(best.cost / best.rows)
+        is_converged = best.is_converged or _count_best(descent_rms, rms) > 1
+        outcome = Outcome.DONE if is_converged else Outcome.NOT_CONVERGED
+        if self.earlier is not None:
+            descent_rms = self.earlier.descent_rms
+        values = model.space.to_values(best.u)
+        return Fit(values, _name_bounds(best.u), None, rms, model.counts, outcome, descent_rms)
 
-    def _choose_starts(self, model: UnitCubeResidual, max_points: int) -> list[np.ndarray]:
+    def add_intervals(self, fit: Fit, kind: str) -> Fit:
+        """Return a fit of this problem with the 95 % intervals of its values.
+
+        Parameters near a bound are tried on it first.
+
+        Parameters
+        ----------
+        fit : Fit
+            Result of `search`.
+        kind : str
+            Value of `IntervalKind`.
+        """
+        model = self.model
+        u = model.space.to_unit_cube(fit.values)
+        u, cost = _move_onto_bounds(model, u, model.sum_of_squares(u))
+        intervals = compute_intervals(model, u, cost, kind)
+        return replace(
+            fit,
+            values=model.space.to_values(u),
+            at_bound=_name_bounds(u),
+            intervals=intervals,
+            rms=np.sqrt(cost / model.rows),
+            counts=model.counts,
+        )
+
+    def _choose_starts(self, max_points: int) -> list[np.ndarray]:
         """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points."""
-        n = len(self.low)
-        given_points = []
-        if self.start is not None:
-            given_points = [model.space.to_unit_cube(self.start)]
-            if not np.isfinite(model.sum_of_squares(given_points[0])):
-                given_points = []
-        trials = []
-        if max_points > 1 or not given_points:
-            trials = list(make_space_filling_points(N_TRIALS_PER_VALUE * n, n))
-        costs = np.array([model.sum_of_squares(point) for point in trials])
-        order = np.argsort(costs, kind="stable")
-        points = given_points + [trials[k] for k in order if np.isfinite(costs[k])]
+        space = self.model.space
+        n = space.low.size
+        given = [] if self.start is None else [space.to_unit_cube(self.start)]
+        points = [point for point in given if np.isfinite(self._try_point(point))]
+        if max_points > len(points):
+            trials = make_space_filling_points(N_TRIALS_PER_VALUE * n, n)
+            costs = np.array([self._try_point(point) for point in trials])
+            order = np.argsort(costs, kind="stable")
+            points += [trials[k] for k in order if np.isfinite(costs[k])]
         if not points:
             raise NotConverged(
-                f"the model failed at all {model.counts.evaluations} starting points of the search: {model.counts.reason}"
+                f"the model failed at all {len(given) + len(trials)} starting points of the search: "
+                f"{self.model.counts.reason}"
             )
         return points[: max(1, max_points)]
+
+    def _try_point(self, point: np.ndarray) -> float:
+        """Return the sum of squares at a starting point (n,) in the unit cube; infinite if the evaluation fails."""
+        self.before_start()
+        return self.model.sum_of_squares(point)
+
+
+def _name_bounds(u: np.ndarray) -> tuple[str, ...]:
+    """Return "low", "high" or "" for each coordinate `u` (n,) of the unit cube."""
+    return tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist())
 
 
 def _count_best(descent_rms: np.ndarray, smallest: float) -> int:
@@ -224,35 +242,9 @@ def _count_best(descent_rms: np.ndarray, smallest: float) -> int:
     return int(np.count_nonzero(descent_rms <= SAME_MINIMUM_RATIO * smallest))
 
 
-def _assemble_fit(
-    model: UnitCubeResidual, best: Descent, descent_rms: np.ndarray, kind: str
-) -> Fit:
-    """Return the result of a fit from its best descent.
-
-    `best` is the descent with the smallest sum of squares, `descent_rms` the root mean square of the residual after each
-    descent, and `kind` a value of `IntervalKind`.
-    """
-    u = best.u
-    cost = best.cost
-    intervals = None
-    if kind != IntervalKind.NONE:
-        u, cost = _move_onto_bounds(model, u, cost)
-        is_series = kind == IntervalKind.SERIES
-        intervals = compute_intervals(model, u, cost, is_series=is_series)
-    rms = np.sqrt(cost / best.rows)
-    is_converged = best.is_converged or _count_best(descent_rms, rms) > 1
-    return Fit(
-        values=model.space.to_values(u),
-        at_bound=tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist()),
-        intervals=intervals,
-        rms=rms,
-        counts=model.counts,
-        outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
-        descent_rms=descent_rms,
-    )
-
-
-def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple[np.ndarray, float]:
+def _move_onto_bounds(
+    model: UnitCubeResidual, u: np.ndarray, cost: float
+) -> tuple[np.ndarray, float]:
     """Move parameters that are near a bound onto it, and fit the others again, unless the sum of squares increases.
 
     A parameter is moved only if the sum of squares decreases towards the bound. `u` (n,) is a point in the unit cube,
@@ -264,7 +256,6 @@ def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple[np.ndarr
     belongs_on_bound = belongs_on_low | belongs_on_high
     if not belongs_on_bound.any():
         return u, cost
-    end = descend(
-        model, np.where(belongs_on_bound, np.round(u), u), np.flatnonzero(~belongs_on_bound)
-    )
+    moved = np.where(belongs_on_bound, np.round(u), u)
+    end: Descent = descend(model, moved, np.flatnonzero(~belongs_on_bound))
     return (end.u, end.cost) if end.cost <= cost * (1 + 1e-9) else (u, cost)

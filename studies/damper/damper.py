@@ -25,8 +25,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 
 from steady_loops import HOLD, write_with_run_in
 
-from patchfem.campaigns.fits.loop import fit_hysteresis_loop
-from patchfem.campaigns.fits.problem import FitOptions, FittedKeys, parse_ranges
+from patchfem.campaigns.fits.problem import FittedKeys, parse_ranges
+from patchfem.campaigns.fits.request import FitOptions, fit_measurement
 from patchfem.inputs import read_loop
 from patchfem.inputs.loops import Loop
 from patchfem.scene import loads
@@ -87,7 +87,7 @@ class Row(NamedTuple):
     measured: float
     loop: Loop
     model: np.ndarray
-    keys: FittedKeys
+    fitted: FittedKeys
 
 
 def plateau(slide) -> np.ndarray:
@@ -137,23 +137,23 @@ def main(file, names=tuple(LAWS)) -> list:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "loop.csv"
                 count = write_with_run_in(path, loop.time, loop.displacement, record.reading)
-                found = fit_hysteresis_loop(
+                found = fit_measurement(
                     loads(SCENE.format(text)), path, parse_ranges(free), FitOptions(hold=(HOLD,))
                 )
-            model = found.model[count:]
+            model = found.computed[count:]
             miss = model - record.reading
             offset -= miss.mean()
         rows.append(
             Row(
                 name,
                 len(free),
-                found.rms,
+                found.fit.rms,
                 float(np.sqrt(np.mean(miss[flat] ** 2))),
                 work(model),
                 work(loop.reading),
                 record,
                 model,
-                found.keys,
+                found,
             )
         )
     return rows
@@ -192,12 +192,12 @@ if __name__ == "__main__":
     for row in table:
         values = ", ".join(
             f"{one.key.partition('.')[2]} {value:.4g} {one.unit}"
-            for one, value in zip(row.keys.ranges, row.keys.fit.values)
+            for one, value in zip(row.fitted.keys.ranges, row.fitted.fit.values)
         )
-        keys = row.keys
+        fitted = row.fitted
         print(
             f"{row.law:20s} rms {row.rms:6.0f} N, plateau {row.plateau:5.0f} N, work {row.work:5.1f} J of "
-            f"{row.measured:5.1f} J, counted rows {keys.fit.intervals.rows:.0f}, {keys.seconds:.0f} s: {values}"
+            f"{row.measured:5.1f} J, counted rows {fitted.fit.intervals.rows:.0f}, {fitted.seconds:.0f} s: {values}"
         )
     if len(sys.argv) > 2:
         draw([row for row in table if row.law in ("coulomb", "stretch", "iwan")], Path(sys.argv[2]))

@@ -34,8 +34,8 @@ from steady_loops import HOLD, write_with_run_in
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.campaigns.fits.loop import fit_hysteresis_loop
-from patchfem.campaigns.fits.problem import FitOptions, parse_ranges
+from patchfem.campaigns.fits.problem import parse_ranges
+from patchfem.campaigns.fits.request import FitOptions, fit_measurement
 from patchfem.scene import loads
 
 FOLDER = Path(__file__).parent
@@ -152,8 +152,8 @@ def read_as_rigid(one: Loop) -> tuple:
         again = np.arange(0, 5001, 4)
         write_with_run_in(path, again * step, one.slider[again % 4000], one.cell[again % 4000])
         free = parse_ranges(["friction.static=0.2..0.5,friction.bond_length=0.2 um..20 um"])
-        found = fit_hysteresis_loop(loads(BENCH), path, free, FitOptions(hold=(HOLD,)))
-    return tuple(float(value) for value in found.keys.fit.values[:2])
+        found = fit_measurement(loads(BENCH), path, free, FitOptions(hold=(HOLD,)))
+    return tuple(float(value) for value in found.fit.values[:2])
 
 
 def picture(loops: list, path: Path) -> Path:

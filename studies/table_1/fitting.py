@@ -24,7 +24,6 @@ from rungs import (
 )
 
 from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
-from patchfem.campaigns.rows.fit import make_residual
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N
 from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, Descent, descend
@@ -52,12 +51,52 @@ NEUTRAL = {
 NULLS = {"constant": "constant", "strong": "power_input_frequency"}
 
 
-def run_descents(model: UnitCubeResidual, points, before_descent) -> list[Descent]:
-    """Return the descents from points (n,) of the unit cube; `before_descent` is called before each."""
+def make_residual(cells, computed: ModelReadings, seen):
+    """Return the function that computes the log ratios (r,) of the readings of a mask from values (n,).
+
+    A reading flagged U has no residual where the computed value is larger.
+
+    Parameters
+    ----------
+    cells : Cells
+    computed : ModelReadings
+    seen : (n,) array of bool
+        Readings that are fitted.
+
+    Returns
+    -------
+    Callable
+    """
+    conditions = sorted(set(cells.condition[seen].tolist()))
+
+    def residual(values) -> np.ndarray:
+        logs = cells.compute_log_ratios(*computed(values, conditions))
+        return np.where(cells.unstable, np.minimum(logs, 0.0), logs)[seen]
+
+    return residual
+
+
+def run_descents(
+    model: UnitCubeResidual, points, before_descent, *, is_quick: bool = True
+) -> list[Descent]:
+    """Return the descents from points (n,) of the unit cube; `before_descent` is called before each.
+
+    Parameters
+    ----------
+    model : UnitCubeResidual
+    points : iterable of (n,) array
+    before_descent : callable
+    is_quick : bool
+        Whether a loose tolerance suffices.
+
+    Returns
+    -------
+    list of Descent
+    """
     ends = []
     for point in points:
         before_descent()
-        ends.append(descend(model, point, range(len(point))))
+        ends.append(descend(model, point, range(len(point)), is_quick=is_quick))
     return ends
 
 
@@ -212,7 +251,7 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
     wanted = computed.models.ranges
     residual = make_residual(cells, computed, seen)
     box = make_search_space([one.low for one in wanted], [one.high for one in wanted])
-    quick = UnitCubeResidual(residual, box, is_expensive=True)
+    quick = UnitCubeResidual(residual, box)
     rng = np.random.default_rng(SEED)
     random = 0
     ends = run_descents(
@@ -236,6 +275,7 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
             UnitCubeResidual(residual, box),
             [min(ends, key=lambda one: one.cost).u],
             before_descent=computed.reset_motions,
+            is_quick=False,
         )[0]
         best, others = group_valleys(
             cells, computed, seen, last, [(box.to_values(one.u), end_rms(one)) for one in ends]

@@ -20,9 +20,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from null_models import fit_null_model
 from rungs import PREDICTED_ROWS, STUCK_READING, Rung
 
-from patchfem.campaigns.fits.problem import FitOptions
+from patchfem.campaigns.fits.request import FitOptions, fit_measurement
 from patchfem.campaigns.rows.cells import compute_rms_scores
-from patchfem.campaigns.rows.fit import fit_rows
 
 FREE = (
     "friction.static=0.2..0.8",
@@ -33,13 +32,13 @@ FREE = (
 
 
 def fit_path(point: bool = False, starts: int = 8):
-    """Return the numbers fitted to 143 Hz from random starts, as FittedRows.
+    """Return the numbers fitted to 143 Hz from random starts, as FittedKeys.
 
     `point` takes one elastic-plastic point in the place of the patch.
     """
     asked = Rung("second_path.toml", FREE, point=point).question(STUCK_READING)
     options = FitOptions(hold=(PREDICTED_ROWS,), starts=starts)
-    return fit_rows(asked.scene, asked.measured, asked.ranges, options)
+    return fit_measurement(asked.scene, asked.measured, asked.ranges, options)
 
 
 def main(starts: int = 8) -> dict:
@@ -50,10 +49,10 @@ def main(starts: int = 8) -> dict:
         begin = time.process_time()
         found = fit_path(name == "point", starts)
         seconds = time.process_time() - begin
-        cells = found.cells
+        cells = found.comparison.cells
         constant = fit_null_model(cells, "constant", ~found.held_out)[0]
         each = {
-            "model": found.compute_scores(),
+            "model": found.comparison.compute_scores(found),
             "constant": {
                 "fitted": compute_rms_scores(cells, constant, ~found.held_out),
                 "held_out": compute_rms_scores(cells, constant, found.held_out),
@@ -66,15 +65,14 @@ def main(starts: int = 8) -> dict:
                     f"{name if what == 'model' else 'null':<8}{part.replace('_', ' '):<12}"
                     f"{one['acceleration']:>14.3f}{one['displacement']:>14.3f}{one['all']:>8.3f}"
                 )
-        keys = found.keys
         print(
             "  "
             + ", ".join(
-                f"{one.key} {value:.4g}" for one, value in zip(keys.ranges, keys.fit.values)
+                f"{one.key} {value:.4g}" for one, value in zip(found.keys.ranges, found.fit.values)
             )
-            + f"; {np.sum(keys.fit.descent_rms < 1.01 * keys.fit.rms)} of {starts} starts end here; {seconds:.0f} s"
+            + f"; {np.sum(found.fit.descent_rms < 1.01 * found.fit.rms)} of {starts} starts end here; {seconds:.0f} s"
         )
-        out[name] = {**each["model"], "values": keys.fit.values, "seconds": seconds}
+        out[name] = {**each["model"], "values": found.fit.values, "seconds": seconds}
     return out
 
 

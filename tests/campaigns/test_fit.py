@@ -10,9 +10,10 @@ from friction_loops import dahl_force, elastic_plastic_force, write_loop
 from scene_texts import CROWNED_JOINT
 
 from patchfem import FitOptions, SceneError, build
-from patchfem.campaigns.fits.loop import BenchModel, fit_hysteresis_loop
-from patchfem.campaigns.fits.problem import FreeKeys, parse_ranges
-from patchfem.campaigns.held_out import select_held_out
+from patchfem.campaigns.fits.held_out import select_held_out
+from patchfem.campaigns.fits.loop import LoopComparison
+from patchfem.campaigns.fits.problem import parse_ranges
+from patchfem.campaigns.fits.request import fit_measurement
 from patchfem.core import PatchfemError
 from patchfem.export.fits import format_fitted_scene
 from patchfem.inputs import read_loop
@@ -94,13 +95,13 @@ def test_exact_parameters_of_each_law_are_recovered(tmp_path, law):
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, reference_force(law, time, slide, TRUTH[law])
     )
-    result = fit_hysteresis_loop(load_scene(tmp_path, law), loop, free_ranges(*TRUTH[law]))
-    assert result.keys.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
-    assert result.rms < 1e-7 * LOAD and result.held_out_rms is None and result.step_error == 0
-    assert (
-        result.keys.fit.intervals.ends[:, 0] <= result.keys.fit.values
-    ).all() and result.keys.warnings == []
-    assert np.ptp(result.keys.fit.intervals.ends, axis=1) == pytest.approx(0, abs=1e-6)
+    result = fit_measurement(load_scene(tmp_path, law), loop, free_ranges(*TRUTH[law]))
+    assert result.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
+    assert result.fit.rms < 1e-7 * LOAD and result.comparison.step_error == pytest.approx(
+        0, abs=1e-9
+    )
+    assert (result.fit.intervals.ends[:, 0] <= result.fit.values).all() and result.warnings == []
+    assert np.ptp(result.fit.intervals.ends, axis=1) == pytest.approx(0, abs=1e-6)
 
 
 def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
@@ -113,9 +114,9 @@ def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
     loop = write_loop(tmp_path / "loop.csv", time, slide, ratio, quantity="friction_ratio")
     (tmp_path / "patch.toml").write_text(PATCH + LAWS["bonds"] + SINE, "utf-8")
     for scene in (load_scene(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
-        result = fit_hysteresis_loop(scene, loop, free_ranges(*TRUTH["bonds"]))
-        assert result.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
-    assert "could not be measured: the mesh has only 7 columns" in result.keys.warnings[-1]
+        result = fit_measurement(scene, loop, free_ranges(*TRUTH["bonds"]))
+        assert result.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
+    assert "could not be measured: the mesh has only 7 columns" in result.warnings[-1]
 
 
 def test_always_mesh_error_of_fit_holds(tmp_path):
@@ -123,11 +124,11 @@ def test_always_mesh_error_of_fit_holds(tmp_path):
     time, slide = sine_path(40, 1)
     path = write_loop(tmp_path / "loop.csv", time, 0.3 * slide, slide)
     text = CROWNED_JOINT + SINE + "[accuracy]\ntolerance = 1e-5\n"
-    bench_model = BenchModel(FreeKeys(loads(text), []), read_loop(path), time)
-    reading = bench_model([])
+    bench_model = LoopComparison(loads(text), path, [])
+    reading = bench_model.compute([])
     error = np.abs(bench_model.estimate_mesh_error([])).max()
     bench_model.patch = solve_with_coarser(build(loads(text)).patch, 1e-5)[0]
-    deviation = np.abs(bench_model([]) - reading).max()
+    deviation = np.abs(bench_model.compute([]) - reading).max()
     assert error > deviation > 1e-4 * np.abs(reading).max()
 
 
@@ -139,10 +140,8 @@ def test_exact_force_of_elastic_pieces_does_not_jump_at_reversals(tmp_path):
     (tmp_path / "patch.toml").write_text(
         PATCH + "[contact.shear]\n" + LAWS["coulomb"] + SINE, "utf-8"
     )
-    result = fit_hysteresis_loop(
-        load(tmp_path / "patch.toml"), loop, free_ranges("friction.static")
-    )
-    assert result.keys.fit.values == pytest.approx([0.31], rel=1e-9) and result.rms < 1e-7 * 80
+    result = fit_measurement(load(tmp_path / "patch.toml"), loop, free_ranges("friction.static"))
+    assert result.fit.values == pytest.approx([0.31], rel=1e-9) and result.fit.rms < 1e-7 * 80
 
 
 # ---- parameters that the rows do not determine, and doubtful records
@@ -159,22 +158,24 @@ def test_exact_excluded_rows_do_not_change_the_fit(tmp_path):
     cycle = 1 + (np.arange(81) > 40)
     wrong = write_loop(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
     scene = load_scene(tmp_path, "elastic-plastic")
-    result = fit_hysteresis_loop(
+    result = fit_measurement(
         scene,
         wrong,
         free_ranges("friction.static", "friction.bond_length"),
         FitOptions(["cycle=2.0"]),
     )
-    assert result.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and result.rms < 1e-6
-    assert result.held_out_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6)
+    assert result.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and result.fit.rms < 1e-6
+    assert result.compute_rms(result.held_out) == pytest.approx(
+        np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6
+    )
     assert result.held_out.sum() == 40
-    first = fit_hysteresis_loop(
+    first = fit_measurement(
         scene,
         write_loop(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),
         free_ranges("friction.static", "friction.bond_length"),
         FitOptions(["cycle=1"]),
     )
-    assert first.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
+    assert first.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
 
 
 def test_exact_parameters_of_steady_loop_follow_from_repeated_cycles(tmp_path):
@@ -188,22 +189,22 @@ def test_exact_parameters_of_steady_loop_follow_from_repeated_cycles(tmp_path):
     cut = slice(93, 254)
     scene = load_scene(tmp_path, "bonds")
     loop = write_loop(tmp_path / "loop.csv", time[cut], slide[cut], force[cut])
-    plain = fit_hysteresis_loop(scene, loop, free_ranges(*names))
-    assert plain.rms > 1.0 and any("--hold cycle=1" in one for one in plain.keys.warnings)
+    plain = fit_measurement(scene, loop, free_ranges(*names))
+    assert plain.fit.rms > 1.0 and any("--hold cycle=1" in one for one in plain.warnings)
     rows = np.r_[93:253, 93:254]
     cycle = 1 + (np.arange(rows.size) >= 160)
     steps = np.arange(rows.size) / 8000
     loop = write_loop(tmp_path / "loop.csv", steps, slide[rows], force[rows], cycle)
-    result = fit_hysteresis_loop(scene, loop, free_ranges(*names), FitOptions(["cycle=1"]))
-    assert result.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-5)
-    assert result.rms < 1e-5 * LOAD and result.keys.warnings == []
+    result = fit_measurement(scene, loop, free_ranges(*names), FitOptions(["cycle=1"]))
+    assert result.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-5)
+    assert result.fit.rms < 1e-5 * LOAD and result.warnings == []
 
 
 def test_always_doubtful_records_give_warnings(tmp_path):
     """Correlated rows and a nonzero first force give warnings."""
     time, slide = sine_path(40)
     late = elastic_plastic_force(slide, 0.31 * LOAD, 2.3e-6)[20:]
-    result = fit_hysteresis_loop(
+    result = fit_measurement(
         load_scene(tmp_path, "elastic-plastic"),
         write_loop(
             tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)
@@ -211,7 +212,7 @@ def test_always_doubtful_records_give_warnings(tmp_path):
         free_ranges("friction.static", "friction.bond_length"),
     )
     assert [
-        any(text in one for one in result.keys.warnings)
+        any(text in one for one in result.warnings)
         for text in (
             "rows are correlated",
             "the force in the first row is",
@@ -231,17 +232,17 @@ def test_exact_missing_time_is_replaced_for_rate_independent_laws(tmp_path):
     )
     loop = tmp_path / "loop.csv"
     loop.write_text(text)
-    result = fit_hysteresis_loop(
+    result = fit_measurement(
         load_scene(tmp_path, "elastic-plastic"),
         loop,
         free_ranges("friction.static", "friction.bond_length"),
     )
-    assert result.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
-    assert "evenly spaced" in result.keys.warnings[0]
+    assert result.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
+    assert "evenly spaced" in result.warnings[0]
     with pytest.raises(
         PatchfemError, match=r"loop.csv:1: law 'tanh' needs the times of the rows of this record"
     ):
-        fit_hysteresis_loop(load_scene(tmp_path, "tanh"), loop, free_ranges("friction.static"))
+        fit_measurement(load_scene(tmp_path, "tanh"), loop, free_ranges("friction.static"))
 
 
 # ---- the fit command
@@ -265,7 +266,7 @@ def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
     assert result == read_json(tmp_path / "out/fit.json")
     static = result["values"]["friction.static"]
     assert static["interval"][0] < 0.31 < static["interval"][1]
-    assert result["held"]["rows"] == 24 and result["unit"] == "N"
+    assert result["held"] == 24
     scene = load(tmp_path / "out/scene.fitted.toml")
     assert scene.friction.static == static["value"] and scene.slide.file == "../loop.csv"
     run = bench.run_bench(build(scene), None, 400)
@@ -369,7 +370,7 @@ def test_refuses_invalid_hold_options_and_scenes(fit_command, tmp_path):
             '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
             '"Ti-8Al-1Mo-1V"\n'
         )
-        fit_hysteresis_loop(loads(text), tmp_path / "loop.csv", [])
+        LoopComparison(loads(text), tmp_path / "loop.csv", [])
 
 
 def test_exact_rest_speed_of_measured_motion_is_written(tmp_path):
@@ -387,10 +388,10 @@ def test_exact_rest_speed_of_measured_motion_is_written(tmp_path):
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31 * LOAD, 2.3e-6)
     )
-    result = fit_hysteresis_loop(scene, loop, free_ranges("friction.static"))
-    change = result.step_error / np.abs(result.loop.reading).max()
-    assert f"changes by {change:.1g} of its peak" in result.keys.warnings[-1]
+    result = fit_measurement(scene, loop, free_ranges("friction.static"))
+    change = result.comparison.step_error / np.abs(result.comparison.measured).max()
+    assert f"changes by {change:.1g} of its peak" in result.warnings[-1]
     speed = np.abs(np.diff(slide) / np.diff(time)).max()
-    text = format_fitted_scene(result, scene, ["Fitted.", "Two."], tmp_path)
+    text = format_fitted_scene(result, ["Fitted.", "Two."], tmp_path)
     assert math.isclose(loads(text).friction.rest_speed, 1e-3 * speed, rel_tol=1e-9)
     assert text.startswith("# Fitted.\n# Two.\n")

@@ -13,8 +13,7 @@ from scene_texts import (
 )
 
 import patchfem as pf
-from patchfem.campaigns.fits import curve as curves
-from patchfem.campaigns.fits.curve import read_damping_curve
+from patchfem.campaigns.fits.curve import CurveComparison
 from patchfem.campaigns.fits.problem import parse_ranges
 from patchfem.core import PatchfemError
 
@@ -27,6 +26,11 @@ IWAN = (
 START = IWAN.replace("chi = -0.35", "chi = -0.6").replace("1e6 N/m", "6e5 N/m")
 AMPLITUDES = np.geomspace(1e-6, 2e-5, 2)
 FREE = {"friction.stiffness": ("3e5 N/m", "3e6 N/m"), "friction.chi": (-0.9, -0.05)}
+
+
+def read_curve(path) -> CurveComparison:
+    """Return the comparison of a measured curve with the Iwan joint."""
+    return CurveComparison(pf.load(IWAN), path, parse_ranges(["friction.chi=-0.9..-0.05"]))
 
 
 def write_decay(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLITUDES):
@@ -76,7 +80,7 @@ def test_exact_parameters_are_recovered_from_computed_decay(tmp_path):
     values = {name: fitted["value"] for name, fitted in result["values"].items()}
     assert values["friction.stiffness"] == pytest.approx(1e6, rel=1e-5)
     assert values["friction.chi"] == pytest.approx(-0.35, abs=1e-5)
-    assert result["outcome"] == "done" and result["rms"]["damping"] < 1e-5
+    assert result["outcome"] == "done" and result["scores"]["damping_residual_rms"] < 1e-5
     assert pf.load(tmp_path / "out/scene.fitted.toml").friction.chi == pytest.approx(
         -0.35, abs=1e-5
     )
@@ -84,7 +88,7 @@ def test_exact_parameters_are_recovered_from_computed_decay(tmp_path):
         np.loadtxt(file, delimiter=",", skiprows=1) for file in (path, tmp_path / "out/fit.csv")
     )
     np.testing.assert_allclose(rows[:, :5], measured, rtol=1e-12)
-    np.testing.assert_allclose(rows[:, 5:], measured[:, [1, 3]], rtol=1e-5)
+    np.testing.assert_allclose(rows[:, 5:7], measured[:, [1, 3]], rtol=1e-5)
     # a free motion loses 1 - exp(-2 pi zeta) of its amplitude in a cycle
     loss = 100 * (1 - np.exp(-2 * np.pi * measured[:, 3].max()))
     assert any(f"the amplitude falls by up to {loss:.2g} %" in note for note in result["notes"])
@@ -119,7 +123,7 @@ def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatc
     # a residual of zero has no chart
     write_decay(tmp_path / "decay.csv", IWAN, 1e-3)
     command = ["fit", "rig.toml", "--to", "decay.csv", "--free", "friction.chi=-0.9..-0.05"]
-    assert "--hold" in run_cli(*command, "--hold", "frequency=1 Hz").err
+    assert "use amplitude" in run_cli(*command, "--hold", "frequency=1 Hz").err
     answer = run_successfully(
         *command, "--set", "friction.stiffness=1e6 N/m", "--starts", "1", "-o", "out"
     )
@@ -160,15 +164,15 @@ def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatc
         "method,amplitude [m],frequency [Hz],damping\na,1e-6,100,0.1\nb,2e-6,100,0.1\n"
     )
     with pytest.raises(PatchfemError, match="several methods"):
-        read_damping_curve(table)
+        read_curve(table)
     table.write_text("amplitude [m],frequency [Hz],damping\n-1e-6,100,0.1\n2e-6,100,0.1\n")
     with pytest.raises(PatchfemError, match="above 0"):
-        read_damping_curve(table)
+        read_curve(table)
     table.write_text(
         "amplitude [m],frequency [Hz],frequency_error [Hz],damping\n1e-6,100,-1,0.1\n2e-6,100,1,0.1\n"
     )
     with pytest.raises(PatchfemError, match="errors must be 0 or more"):
-        read_damping_curve(table)
+        read_curve(table)
 
 
 def test_exact_damping_in_percent_and_assumed_errors(tmp_path):
@@ -179,31 +183,15 @@ def test_exact_damping_in_percent_and_assumed_errors(tmp_path):
         "amplitude [um],frequency [Hz],damping [%],damping_error [%]\n"
         + "".join(",".join(map(str, row)) + "\n" for row in rows)
     )
-    curve = read_damping_curve(path)
-    assert curve.value.tolist() == pytest.approx(np.array([[100, 99], [0.002, 0.003]]), rel=1e-15)
-    assert curve.error.tolist() == pytest.approx(np.array([[2.5, 2.475], [0.0025, 0.0025]]))
-    assert curve.assumed.tolist() == [True, False]
-    far = curve.scale_assumed_errors(curve.value * [[1.01], [1.1]], 0)
-    assert far.error[0] == pytest.approx(0.01 * curve.value[0], rel=1e-3)
-    assert far.error[1] == pytest.approx(curve.error[1])
-    assert far.describe_assumed_errors().endswith(
-        "fit: 2 % of each frequency (no column frequency_error)"
-    )
-
-
-class CurveWithGap(curves.CurveModel):
-    """Curve of a model that has no value at the largest amplitude."""
-
-    def _compute(self, values, method):
-        """Return constant frequency and damping with a gap."""
-        return np.array([[100.0, np.nan], [0.01, np.nan]])
-
-
-def test_exact_curve_with_a_gap_is_refused_with_its_place():
-    """A method without a value at a measured amplitude is refused with this amplitude, which is named once."""
-    model = CurveWithGap(pf.load(IWAN), parse_ranges(["friction.chi=-0.9..-0.05"]), AMPLITUDES)
-    with pytest.raises(PatchfemError, match="not oscillate at 1 of 2 amplitudes, at 20 um; leave"):
-        model.compute([-0.5], "balance")
+    curve = read_curve(path)
+    every = np.ones(4, bool)
+    assert curve.measured == pytest.approx([100, 99, 0.002, 0.003], rel=1e-15)
+    assert curve.deviation == pytest.approx([2.5, 2.475, 0.0025, 0.0025])
+    assert curve.is_assumed.tolist() == [True, False]
+    curve.keys.ranges = []
+    deviation = curve.estimate_deviation(curve.measured * [1.01, 1.01, 1.1, 1.1], every)
+    assert deviation[:2] == pytest.approx(0.01 * curve.measured[:2], rel=1e-3)
+    assert deviation[2:] == pytest.approx(curve.deviation[2:])
 
 
 def test_refuses_fewer_values_than_parameters(tmp_path):
@@ -217,11 +205,7 @@ def test_refuses_fewer_values_than_parameters(tmp_path):
     with pytest.raises(
         PatchfemError, match=r"only 4 values are used .* too few to determine 4 values"
     ):
-        curves.fit_curve(
-            pf.load(IWAN),
-            path,
-            parse_ranges([f"{key}={low}..{high}" for key, (low, high) in free.items()]),
-        )
+        pf.fit(IWAN, to=path, free=free)
 
 
 def test_assumed_errors_are_the_scatter_around_the_fit_by_balance(tmp_path):
@@ -250,6 +234,6 @@ def test_assumed_errors_are_the_scatter_around_the_fit_by_balance(tmp_path):
         for name in ("frequency", "damping"):
             relative_error = data[f"{name}_error"].values / data[name].values
             # one parameter takes up half a degree of freedom of each of the two quantities
-            scatter = result["rms"][name] * np.sqrt(8 / 7.5)
+            scatter = result["scores"][f"{name}_residual_rms"] * np.sqrt(8 / 7.5)
             assert np.median(relative_error) == pytest.approx(2 * scatter, rel=0.01), name
-    assert result["rms"]["frequency"] == pytest.approx(5e-4, rel=0.01)
+    assert result["scores"]["frequency_residual_rms"] == pytest.approx(5e-4, rel=0.01)

@@ -43,7 +43,7 @@ def test_exact_wear_coefficient_is_recovered_from_computed_depth(
     ).content
     fitted = content["values"]["wear.coefficient"]
     assert fitted["value"] == pytest.approx(3e-15, rel=1e-3, abs=0)
-    assert "without an interval" in content["warnings"][0]
+    assert "without an interval" in content["warnings"][-1]
 
     # A depth without an interval leaves the numerical error of the run, to which the rounding of the fit is added.
     relative_error = measure.error / measure.value
@@ -85,7 +85,7 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
     high = fitted["value"] * (1 + error / 2)
     low = ("--free", f"wear.coefficient=1e-16 m^2/N..{high} m^2/N")
     content = run_cli("fit", scene, "--to", "worn_depth_mean=20 nm", *low, "--json").content
-    assert "raise the high bound" in content["warnings"][-1]
+    assert "do not exclude its high bound" in content["warnings"][0]
     for name in ("common_length", "registration"):  # 1.0 wrote no common length
         page.write_text(f'{{"{name}": {{}}, "worn_depth_max": {{}}}}')
         assert "--predicted" in run_cli("fit", scene, "--to", page, *FREE).err
@@ -115,7 +115,7 @@ def test_refuses_unsuitable_depths_and_parameters(scene, tmp_path):
         return answer.err
 
     assert "raise the high bound" in fit_error("--to", "worn_depth_max=1 mm", *FREE)
-    assert "below the low bound" in fit_error("--to", "worn_depth_max=1e-3 nm", *FREE)
+    assert "lower the low bound" in fit_error("--to", "worn_depth_max=1e-3 nm", *FREE)
     assert "only wear.coefficient" in fit_error(
         "--to", "worn_depth_max=1 um", "--free", "friction.static=0.1..0.6"
     )

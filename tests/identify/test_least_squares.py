@@ -1,14 +1,11 @@
 """Bounded least squares compared with linear algebra, closed-form profiles and known solutions."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
 from patchfem.identify import Problem, describe_fit, least_squares
-from patchfem.identify.least_squares import Search
 from patchfem.identify.space import make_search_space
 
 RNG = np.random.default_rng(7)
@@ -215,8 +212,8 @@ def test_always_lower_end_that_no_start_reached_is_not_converged(monkeypatch):
     for cost, outcome in ((9.0, Outcome.NOT_CONVERGED), (2.21, Outcome.DONE)):
         ends = [least_squares.Descent(np.array([0.0]), one, False, 2) for one in (cost, cost, 2.21)]
         following = iter(ends)
-        monkeypatch.setattr(least_squares, "descend", lambda *_, ends=following: next(ends))
-        assert problem.search(Search(2, seed=1), "").outcome is outcome
+        monkeypatch.setattr(least_squares, "descend", lambda *_, ends=following, **__: next(ends))
+        assert problem.search(2, is_quick=True).outcome is outcome
 
 
 def test_refuses_unsolvable_fits():
@@ -267,15 +264,12 @@ def test_exact_counts_contain_every_evaluation():
             raise PatchfemError("too large")
         return DESIGN @ values - NOISY
 
-    problem = Problem(residual, [-5, -5, -5], [5, 5, 5])
-    fit = problem.search(Search(3, seed=1))
-    assert fit.counts.evaluations == len(calls)
-    first = problem.solve(4, "")
-    second = replace(problem, start=first.values).solve(1).count_earlier_search(first)
-    assert fit.counts.evaluations + second.counts.evaluations == len(calls)
+    bounds = ([-5] * 3, [5] * 3)
+    first = Problem(residual, *bounds).search(4)
+    second = Problem(residual, *bounds, earlier=first).solve(1)
+    assert second.counts.evaluations == len(calls)
     assert second.n_best == first.n_best == 4
-    failures = fit.counts.failures + second.counts.failures
-    assert failures == sum(values[0] > 4 for values in calls) > 0
+    assert second.counts.failures == sum(values[0] > 4 for values in calls) > 0
     assert second.counts.reason == "too large"
 
 

@@ -35,11 +35,11 @@ def test_bond_law_fits_the_plateaus_but_not_the_backlash():
     stretch = rows["stretch"]
     loop = rows["stretch"].loop
     scatter = damper.repeat(loop)[1]
-    assert stretch.keys.fit.values[1] == pytest.approx(2.04e-3, rel=0.01)
+    assert stretch.fitted.fit.values[1] == pytest.approx(2.04e-3, rel=0.01)
     assert stretch.work == pytest.approx(stretch.measured, rel=0.005)
     assert stretch.plateau < 0.07 * 4.2e3
     assert stretch.rms > 8 * scatter and rows["elastic-plastic"].rms > stretch.rms
     assert rows["coulomb"].work < 0.9 * stretch.measured
-    limit = stretch.keys.fit.values[0] * damper.LOAD
+    limit = stretch.fitted.fit.values[0] * damper.LOAD
     assert np.abs(loop.reading).max() > 2 * limit
-    assert 40 < stretch.keys.fit.intervals.rows < 90
+    assert 40 < stretch.fitted.fit.intervals.rows < 90

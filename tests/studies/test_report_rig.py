@@ -135,7 +135,7 @@ def test_steps_give_stated_gain_and_scores(tmp_path, capsys):
         if step.read[1] and not step.unstable
     ]
     assert_contains(steps.ANSWER, f"are {np.exp(np.mean(stable)):.2f} times")
-    gain, (low, high) = fits[True].keys.fit.values[3], fits[True].keys.fit.intervals.ends[3]
+    gain, (low, high) = fits[True].fit.values[3], fits[True].fit.intervals.ends[3]
     assert_contains(steps.ANSWER, f"{gain:.2f} ({low:.2f} to {high:.2f})")
     for part, words in (
         ("fitted", "143 Hz ({:.3f} instead of {:.3f})"),

@@ -5,8 +5,8 @@ import csv
 import numpy as np
 from scene_texts import DRIVE, MODE
 
-from patchfem.campaigns.fits.loop import fit_hysteresis_loop
 from patchfem.campaigns.fits.problem import parse_ranges
+from patchfem.campaigns.fits.request import fit_measurement
 from patchfem.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
@@ -71,7 +71,7 @@ def fit_law(folder, law: str, loop: tuple, free: str):
         out = csv.writer(file)
         out.writerow(["time [s]", "displacement [m]", "force [N]"])
         out.writerows([repr(float(value)) for value in row] for row in zip(*loop))
-    return fit_hysteresis_loop(load(path), folder / "loop.csv", parse_ranges([free]))
+    return fit_measurement(load(path), folder / "loop.csv", parse_ranges([free]))
 
 
 def shrinking_sine(count: int = 400):

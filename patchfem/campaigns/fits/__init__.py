@@ -1,7 +1,7 @@
 """Fits of scene parameters to measurements.
 
 In: a scene, ranges of its free parameters, and a measurement: a friction loop (`loop`), frequency and damping as functions
-of amplitude (`curve`) or a worn depth (`wear`); `campaigns.rows` fits a rig to a table of responses. Out: fitted values with
-95 % confidence intervals and warnings (`problem.FittedKeys`), and the measured and computed data. Fits to a loop, a curve or
-a table minimise a sum of squares by `identify.least_squares`. Read `problem` first, then `loop`.
+of amplitude (`curve`), a table of responses (`rows`) or a worn depth (`wear`). Out: fitted values with 95 %
+confidence intervals and warnings, and the measured and computed values (`problem.FittedKeys`). Each kind of measurement is a
+`problem.Comparison`, and `problem.fit_keys` fits them all. Read `problem` first, then `loop`.
 """

@@ -1,18 +1,18 @@
-"""Fit of a bench scene with a prescribed displacement to a measured friction loop.
+"""Comparison of a bench scene with a measured friction loop.
 
 The model is free of stress in the first row of the record and follows the measured displacement, which is interpolated
 linearly between rows. If the force depends on the time steps, they are halved until the fit converges.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ...convergence import convergence_error
-from ...core import NotConverged, PatchfemError
+from ...core import PatchfemError
 from ...effects import law_has_trait
+from ...identify.intervals import IntervalKind
 from ...inputs.loops import Loop, read_loop
 from ...model.gap import find_shape_side
 from ...model.model import Model, build
@@ -23,9 +23,7 @@ from ...runs.bench.engine import choose_smooth_bond_summation
 from ...runs.patch.mesh_levels import solve_on_other_mesh
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
-from ..held_out import select_held_out
-from .options import FitOptions
-from .problem import DEFAULT_OPTIONS, FittedKeys, FreeKeys, solve_contact
+from .problem import SILENT_LISTENER, Comparison, FittedKeys, FreeKeys, Listener, solve_contact
 
 # Number of time steps between two rows at which the steps are not halved any more.
 MAX_STEPS_PER_ROW = 64
@@ -41,90 +39,76 @@ MIN_RMS_OVER_PEAK = 1e-6
 MAX_FIRST_FORCE_OVER_PEAK_FORCE = 0.2
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class FittedLoop:
-    """Fit of a scene to a measured friction loop.
-
-    Attributes
-    ----------
-    keys : FittedKeys
-        Fitted values of the free keys, with intervals.
-    loop : Loop
-        Measured loop.
-    held_out : (k,) bool
-        Mask of the rows that were predicted but not fitted.
-    model : (k,) array
-        Computed force [N] or friction ratio at the rows of `loop`.
-    step_error : float
-        Largest change of `model` when the time steps are halved.
-    steps_per_row : int
-        Number of time steps between two rows.
-    """
-
-    keys: FittedKeys
-    loop: Loop
-    held_out: np.ndarray
-    model: np.ndarray
-    step_error: float
-    steps_per_row: int
-
-    @property
-    def rms(self) -> float:
-        """Root mean square residual of the fitted rows, in the unit of the reading."""
-        return self._residual_rms(~self.held_out)
-
-    @property
-    def held_out_rms(self) -> float | None:
-        """Root mean square residual of the held-out rows; None if there are none."""
-        return self._residual_rms(self.held_out) if self.held_out.any() else None
-
-    def _residual_rms(self, mask: np.ndarray) -> float:
-        """Return the root mean square residual of the rows in a mask (k,)."""
-        residual = self.model - self.loop.reading
-        return np.sqrt(np.mean(residual[mask] ** 2))
-
-
-class BenchModel:
-    """Force [N] or friction ratio (k,) at the rows of a measured loop, as a function of the values of free keys.
+class LoopComparison(Comparison):
+    """Force [N] or friction ratio (k,) at the rows of a measured loop, and of a bench scene.
 
     Parameters
     ----------
-    keys : FreeKeys
-        Free keys of a scene with [slide].
-    loop : Loop
-        Measured loop.
-    time : (k,) array
-        Times of its rows [s].
-    say : callable, optional
-        Called with a line of text that reports the progress.
+    scene : Scene
+        Scene of a bench.
+    path : path-like
+        File of the measured loop.
+    ranges : sequence of Range
+        Bounds of the free keys.
+    listener : Listener
+        Told a line of text that reports the progress.
+
+    Raises
+    ------
+    SceneError, PatchfemError
+        If the input is invalid.
     """
 
-    def __init__(self, keys: FreeKeys, loop: Loop, time: np.ndarray, say: Callable | None = None):
-        self.keys = keys
+    interval_kind = IntervalKind.SERIES
+
+    def __init__(
+        self,
+        scene: Scene,
+        path: Path,
+        ranges: Sequence[Range],
+        listener: Listener = SILENT_LISTENER,
+    ):
+        if scene.kind != "bench":
+            raise SceneError(
+                [
+                    f"{scene.path}: fit: to fit a measured loop the scene must prescribe the motion "
+                    f"with [slide], but this is a {scene.kind} scene; add [slide]"
+                ]
+            )
+        loop = read_loop(path)
+        time, notes = _find_row_times(scene, loop)
+        keys = FreeKeys(scene, ranges, _set_rest_speed(scene, ranges, loop, time))
+        super().__init__(keys, path, loop.reading, loop.labels)
+        self.warnings += notes
+
+        # Mistakes in the files that the scene names do not depend on the keys. They are raised here, because a search
+        # takes an error as a failed evaluation.
+        with locate_errors(scene):
+            build(scene)
+
         self.loop = loop
         self.time = time
-        self.say = say
-        law = keys.scene.friction.law
+        self.say = listener.say
+        law = scene.friction.law
         is_rigid = law_has_trait(law, "set-valued") and not law_has_trait(law, "averaged")
         # The force of elastic pieces does not jump where the speed does.
-        contact = keys.scene.contact
+        contact = scene.contact
         is_elastic = contact is not None and bool(contact.compliance_key)
         self.is_discontinuous = (law_has_trait(law, "creeps") or is_rigid) and not is_elastic
-        self.is_exact = _is_step_independent(keys.scene)
-        steps = keys.scene.accuracy.steps_per_cycle
-        self.has_fixed_steps = steps is not None
+        self.is_exact = _is_step_independent(scene)
+        steps = scene.accuracy.steps_per_cycle
+        self.has_fixed_steps = self.is_exact or steps is not None
         self.steps_per_row = 1
-        if self.has_fixed_steps and not self.is_exact:
+        if steps is not None and not self.is_exact:
             self.steps_per_row = max(1, -(-steps // (loop.reading.size - 1)))
+        self.step_error = 0.0
         self.patch = None
         self.meshes = None
 
-    def __call__(self, values: np.ndarray) -> np.ndarray:
-        """Compute the reading (k,) at the rows for values (n,) [SI] of the keys.
+    def compute(self, values: Sequence[float], needed: np.ndarray | None = None) -> np.ndarray:
+        """Compute the reading (k,) at all rows for values (n,) [SI] of the keys.
 
         Raises PatchfemError if the scene is invalid for these values, or if nothing presses the pieces together.
-
-        `values` (n,) are those of the free keys.
         """
         model = self.keys.build_model(values)
         with locate_errors(model.source):
@@ -168,32 +152,46 @@ class BenchModel:
     def _choose_meshes(self) -> SharedMeshes:
         """Return common meshes of all values: those of the lower ends, the middles and the upper ends of the ranges."""
         models = []
+        low, high = self.keys.bounds.T
         for part in (0.0, 0.5, 1.0):
-            values = [bound.low + part * (bound.high - bound.low) for bound in self.keys.ranges]
             try:
-                models.append(self.keys.build_model(values))
+                models.append(self.keys.build_model(low + part * (high - low)))
             except PatchfemError:
                 continue  # the search counts this error as a failed evaluation, too
         return SharedMeshes(models, False)
 
-    def measure_step_change(self, values: np.ndarray) -> np.ndarray:
-        """Return the change (k,) of the computed reading when the time steps are halved.
-
-        `values` (n,) are those of the free keys. The change is 0 if the steps have no effect.
-        """
-        coarse = self(values)
+    def measure_step_change(self, values: Sequence[float]) -> np.ndarray:
+        """Return the change (k,) of the computed reading when the time steps are halved; 0 if they have no effect."""
+        coarse = self.compute(values)
         if self.is_exact:
             return np.zeros_like(coarse)
         self.steps_per_row *= 2
-        fine = self(values)
+        fine = self.compute(values)
         self.steps_per_row //= 2
         return fine - coarse
 
-    def estimate_mesh_error(self, values: np.ndarray) -> np.ndarray:
+    def refine(self, values: np.ndarray, training: np.ndarray) -> bool:
+        """Halve the time steps until their effect on the reading is negligible, unless the scene sets them.
+
+        The effect is negligible if halving the steps changes no reading by more than MAX_STEP_CHANGE_OVER_TOLERANCE times
+        the tolerance of the scene, relative to the largest reading. There are at most MAX_STEPS_PER_ROW steps per row.
+        """
+        first_steps = self.steps_per_row
+        limit = MAX_STEP_CHANGE_OVER_TOLERANCE * self.keys.scene.accuracy.tolerance
+        while not self.has_fixed_steps and self.steps_per_row < MAX_STEPS_PER_ROW:
+            largest = np.abs(self.compute(values)).max()
+            if np.abs(self.measure_step_change(values)).max() <= limit * largest:
+                break
+            self.steps_per_row *= 2
+            if self.say:
+                self.say(f"{self.steps_per_row} time steps between neighbouring rows of the record")
+        return self.steps_per_row > first_steps
+
+    def estimate_mesh_error(self, values: Sequence[float]) -> np.ndarray:
         """Return the error (k,) of the computed reading by the mesh of a patch, with its sign; 0 without a patch.
 
-        `values` (n,) are those of the free keys. The error follows from another mesh. Raises PatchfemError if there is no
-        other mesh, or if the patch cannot be solved on it.
+        The error follows from another mesh. Raises PatchfemError if there is no other mesh, or if the patch cannot be
+        solved on it.
         """
         model = self.keys.build_model(values)
         patch = self._solve_patch(model)
@@ -203,24 +201,54 @@ class BenchModel:
         change = self._compute_reading(model, patch) - self._compute_reading(model, other)
         return convergence_error(1.0, ratio=2.0 if other.x.size < patch.x.size else 0.5) * change
 
-    def refine_steps(self, values: np.ndarray) -> None:
-        """Halve the time steps until their effect on the reading is negligible, unless the scene sets them.
+    def estimate_changes(self, values: np.ndarray) -> np.ndarray:
+        """Return the errors (m, k) of the reading by the time steps and, if it can be measured, by the mesh."""
+        step_change = self.measure_step_change(values)
+        self.step_error = np.abs(step_change).max()
+        changes = [convergence_error(1.0, ratio=0.5, order=2.0) * step_change]
+        try:
+            changes.append(self.estimate_mesh_error(values))
+        except (PatchfemError, MemoryError) as reason:
+            self.warnings.append(
+                "the intervals do not contain the numerical error of the mesh, which could not be measured: "
+                f"{reason or 'out of memory'}"
+            )
+        return np.array(changes)
 
-        The effect is negligible if halving the steps changes no reading by more than MAX_STEP_CHANGE_OVER_TOLERANCE times
-        the tolerance of the scene, relative to the largest reading. There are at most MAX_STEPS_PER_ROW steps per row.
+    def find_warnings(self, fitted: FittedKeys) -> list[str]:
+        """Return warnings about correlated residuals, the force at the start and coarse steps."""
+        peak = np.abs(self.measured).max()
+        n_used = np.count_nonzero(~fitted.held_out)
+        n_independent = fitted.fit.intervals.rows
+        warnings = []
 
-        Parameters
-        ----------
-        values : (n,) array
-            Values of the n free keys [SI].
-        """
-        limit = MAX_STEP_CHANGE_OVER_TOLERANCE * self.keys.scene.accuracy.tolerance
-        while not self.has_fixed_steps and self.steps_per_row < MAX_STEPS_PER_ROW:
-            if np.abs(self.measure_step_change(values)).max() <= limit * np.abs(self(values)).max():
-                return
-            self.steps_per_row *= 2
-            if self.say:
-                self.say(f"{self.steps_per_row} time steps between neighbouring rows of the record")
+        # Correlated deviations are an error of the model. Deviations of the size of round-off say nothing.
+        is_exact_fit = fitted.fit.rms <= MIN_RMS_OVER_PEAK * peak
+        if not is_exact_fit and n_independent < MIN_INDEPENDENT_FRACTION * n_used:
+            warnings.append(
+                "the deviations of neighbouring rows are correlated, so the intervals are computed as "
+                f"if the {n_used} rows were {max(n_independent, 1):.3g} independent rows; a part of the deviation "
+                "is systematic"
+            )
+
+        # The model carries no force before its first slide. A law without memory does not depend on the start, and rows
+        # that are held out are not fitted.
+        first_force = abs(self.measured[0])
+        scene = self.keys.scene
+        needs_no_start = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
+        if first_force > MAX_FIRST_FORCE_OVER_PEAK_FORCE * peak and not needs_no_start:
+            warnings.append(
+                f"the force in the first row is {first_force / peak:.0%} of the largest force, but the model "
+                "starts without force: repeat the rows of the first cycle before the record, with a column of labels, and "
+                "hold out this cycle, as --hold cycle=1, or give a record that begins at rest"
+            )
+
+        if self.step_error > scene.accuracy.tolerance * peak:
+            warnings.append(
+                "if the time steps are halved, the force of the model changes by "
+                f"{self.step_error / peak:.1g} of its peak, more than the tolerance"
+            )
+        return warnings
 
 
 def _is_step_independent(scene: Scene) -> bool:
@@ -234,105 +262,6 @@ def _is_step_independent(scene: Scene) -> bool:
     if contact is None:
         return True
     return not (bonds and contact.compliance_key) and find_shape_side(contact) != "lower"
-
-
-def fit_hysteresis_loop(
-    scene: Scene,
-    loop_file: Path,
-    ranges: Sequence[Range],
-    options: FitOptions = DEFAULT_OPTIONS,
-    say: Callable | None = None,
-) -> FittedLoop:
-    """Fit free keys of a bench scene to the measured friction loop in a file.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene of a bench.
-    loop_file : Path
-        File of the measured loop.
-    ranges : sequence of Range
-        Bounds of the free keys.
-    options : FitOptions
-        `hold` selects rows that are predicted but not fitted.
-    say : callable, optional
-        Called with a line of text that reports the progress.
-
-    Returns
-    -------
-    FittedLoop
-
-    Raises
-    ------
-    SceneError, PatchfemError
-        If the input is invalid.
-    NotConverged
-        If the model cannot be evaluated at any starting point.
-    """
-    if scene.kind != "bench":
-        raise SceneError(
-            [
-                f"{scene.path}: fit: to fit a measured loop the scene must prescribe the motion "
-                f"with [slide], but this is a {scene.kind} scene; add [slide]"
-            ]
-        )
-    loop = read_loop(loop_file)
-    held_out = np.zeros(loop.reading.size, bool)
-    for selector in options.hold:
-        held_out |= select_held_out(selector, loop.path, loop.labels)
-    time, notes = _find_row_times(scene, loop)
-    keys = FreeKeys(scene, ranges, _set_rest_speed(scene, ranges, loop, time), notes)
-    keys.require_enough_rows(loop_file, np.count_nonzero(~held_out), "rows")
-
-    # Mistakes in the files that the scene names do not depend on the keys. They are raised here, because a search takes an
-    # error as a failed evaluation.
-    with locate_errors(scene):
-        build(scene)
-
-    # Least squares of the deviations, as fractions of the largest force. A force that depends on the time steps is fitted
-    # with the largest steps first, without intervals.
-    bench = BenchModel(keys, loop, time, say)
-    scale = np.abs(loop.reading[~held_out]).max(initial=0.0)
-    problem = keys.make_problem(lambda values: (bench(values) - loop.reading)[~held_out] / scale)
-    try:
-        fit = problem.solve(interval_kind="series" if bench.is_exact else "")
-    except NotConverged:
-        # If a value of the keys makes the scene invalid, its mistakes are raised instead.
-        keys.base.override(keys.assign([bound.low for bound in ranges]))
-        raise
-
-    # The steps are halved until the force at this result converges, and the search goes on from there.
-    if not bench.is_exact:
-        first = fit
-        bench.refine_steps(first.values)
-        fit = replace(problem, start=first.values).solve(1, "series")
-        fit = fit.count_earlier_search(first)
-
-    # The intervals contain the numerical error of the force, from half the steps and from another mesh. A mesh whose error
-    # cannot be measured does not end the fit.
-    step_change = bench.measure_step_change(fit.values)
-    changes = [convergence_error(1.0, ratio=0.5, order=2.0) * step_change]
-    warnings = []
-    try:
-        changes.append(bench.estimate_mesh_error(fit.values))
-    except (PatchfemError, MemoryError) as reason:
-        warnings.append(
-            "the intervals do not contain the numerical error of the mesh, which could not be measured: "
-            f"{reason or 'out of memory'}"
-        )
-    fit = keys.widen(fit, np.array(changes)[:, ~held_out] / scale)
-
-    # The warnings need the fitted loop, and belong to its keys.
-    fitted = FittedLoop(
-        keys=keys.make_fitted_keys(fit),
-        loop=loop,
-        held_out=held_out,
-        model=bench(fit.values),
-        step_error=np.abs(step_change).max(),
-        steps_per_row=bench.steps_per_row,
-    )
-    warnings += _warn_of_doubtful_fit(fitted)
-    return replace(fitted, keys=keys.make_fitted_keys(fit, warnings))
 
 
 def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:
@@ -371,39 +300,3 @@ def _set_rest_speed(
         return []
     speeds = np.abs(np.diff(loop.displacement) / np.diff(time))
     return [f"friction.rest_speed={REST_SPEED_FRACTION * float(speeds.max())!r} m/s"]
-
-
-def _warn_of_doubtful_fit(fitted: FittedLoop) -> list[str]:
-    """Return warnings about a fitted loop: correlated residuals, force at the start, coarse steps."""
-    loop = fitted.loop
-    scene = fitted.keys.scene
-    peak = np.abs(loop.reading).max()
-    n_used = np.count_nonzero(~fitted.held_out)
-    n_independent = fitted.keys.fit.intervals.rows
-    warnings = []
-
-    # Correlated deviations are an error of the model. Deviations of the size of round-off say nothing.
-    if fitted.rms > MIN_RMS_OVER_PEAK * peak and n_independent < MIN_INDEPENDENT_FRACTION * n_used:
-        warnings.append(
-            "the deviations of neighbouring rows are correlated, so the intervals are computed as "
-            f"if the {n_used} rows were {max(n_independent, 1):.3g} independent rows; a part of the deviation "
-            "is systematic"
-        )
-
-    # The model carries no force before its first slide. A law without memory does not depend on the start, and rows that
-    # are held out are not fitted.
-    first_force = abs(loop.reading[0])
-    needs_no_start = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
-    if first_force > MAX_FIRST_FORCE_OVER_PEAK_FORCE * peak and not needs_no_start:
-        warnings.append(
-            f"the force in the first row is {first_force / peak:.0%} of the largest force, but the model "
-            "starts without force: repeat the rows of the first cycle before the record, with a column of labels, and hold "
-            "out this cycle, as --hold cycle=1, or give a record that begins at rest"
-        )
-
-    if fitted.step_error > scene.accuracy.tolerance * peak:
-        warnings.append(
-            "if the time steps are halved, the force of the model changes by "
-            f"{fitted.step_error / peak:.1g} of its peak, more than the tolerance"
-        )
-    return warnings

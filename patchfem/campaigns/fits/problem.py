@@ -1,18 +1,21 @@
-"""Free keys of a scene as the unknowns of a least-squares problem, and the record of their fitted values.
+"""Every fit as one least-squares problem: free keys of a scene, and a comparison of its model with a measurement.
 
-A fit to a loop, a curve or a response table makes a `Problem` of its `FreeKeys` and of a residual, which compares the model
-that `FreeKeys.build_model` returns with the measurement. `make_fitted_keys` returns the result with all warnings.
+A kind of measurement derives a class from `Comparison`, which computes the measured values from values of the keys.
+`fit_keys` minimises the residual, refines the model where the comparison asks for it, computes intervals that contain the
+numerical errors of the model, and predicts rows that are held out or left out.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
-from ...core import Outcome, PatchfemError
+from ...core import NotConverged, Outcome, PatchfemError
+from ...identify.advice import advise_test
 from ...identify.fit_sentences import describe_fit
+from ...identify.intervals import IntervalKind
 from ...identify.least_squares import Fit, Problem
 from ...model.model import Model, build
 from ...model.rig import JOINT_TABLES
@@ -22,7 +25,11 @@ from ...scene.assignments import BOUNDS_FORM, Range, read_assignments
 from ...scene.lines import find_scene_value
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, add_sets
+from .held_out import group_by_column, select_held_out
 from .options import FitOptions
+
+# Largest number of refinements of a model in a fit; two to five suffice.
+MAX_REFINEMENTS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,43 +50,6 @@ DEFAULT_OPTIONS = FitOptions()
 SILENT_LISTENER = Listener()
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class FittedKeys:
-    """Fitted values of the free keys of a scene, with confidence intervals and warnings.
-
-    Attributes
-    ----------
-    scene : Scene
-        The scene before the fit.
-    ranges : list of Range
-        Bounds of the free keys.
-    fit : Fit
-        Values and intervals in the order of `ranges`.
-    sets : list of str
-        The ``table.key=value`` strings of the fitted scene.
-    warnings : list of str
-        Sentences for the user on the fit and its assumptions.
-    seconds : float
-        Elapsed time of the fit.
-    """
-
-    scene: Scene
-    ranges: list[Range]
-    fit: Fit
-    sets: list[str]
-    warnings: list[str]
-    seconds: float
-
-    @property
-    def outcome(self) -> Outcome:
-        """Outcome of the fit: done, or not_converged if the search did not converge."""
-        return self.fit.outcome
-
-    def fitted_scene(self) -> Scene:
-        """Return the scene with the fitted values."""
-        return add_sets(self.scene, self.sets)
-
-
 class FreeKeys:
     """Free keys of a scene, and the models of the scene with their values.
 
@@ -91,32 +61,32 @@ class FreeKeys:
         Bounds of the free keys.
     sets : sequence of str
         The ``table.key=value`` strings that are set for all values of the keys.
-    notes : sequence of str
-        Assumptions of the fit, which are added to the warnings.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        ranges: Sequence[Range],
-        sets: Sequence[str] = (),
-        notes: Sequence[str] = (),
-    ):
+    def __init__(self, scene: Scene, ranges: Sequence[Range], sets: Sequence[str] = ()):
         self.scene = scene
         self.ranges = list(ranges)
         self.sets = list(sets)
-        self.notes = list(notes)
         self.base = BaseScene(add_sets(scene, self.sets))
-        self.start_time = perf_counter()
 
     def assign(self, values: Iterable[float]) -> list[str]:
         """Return the ``table.key=value`` strings that set the keys to values (n,) [SI]."""
         return [bound.format_assignment(value) for bound, value in zip(self.ranges, values)]
 
     @property
+    def names(self) -> list[str]:
+        """Names of the keys."""
+        return [bound.key for bound in self.ranges]
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Bounds (n, 2) of the keys [SI]."""
+        return np.array([(bound.low, bound.high) for bound in self.ranges])
+
+    @property
     def changes_contact(self) -> bool:
         """Whether a key changes the static contact solution."""
-        return any(bound.key.startswith("contact.") for bound in self.ranges)
+        return any(name.startswith("contact.") for name in self.names)
 
     def build_model(self, values: Iterable[float]) -> Model:
         """Build the model of the scene with values (n,) [SI] of the keys.
@@ -137,53 +107,270 @@ class FreeKeys:
             values.append(np.clip(known, bound.low, bound.high))
         return values
 
-    def require_enough_rows(self, path: Path, count: int, name: str) -> None:
-        """Raise PatchfemError if a measurement has too few values to determine the keys and their intervals.
 
-        Parameters
-        ----------
-        path : Path
-            File of the measurement.
-        count : int
-            Number of fitted values, without those that are held out.
-        name : str
-            Word for these values, such as "rows".
+class Comparison:
+    """Measured values (r,) beside those that the model of a scene computes.
+
+    Attributes
+    ----------
+    keys : FreeKeys
+        Free keys of the scene.
+    path : Path
+        File of the measurement.
+    measured : (r,) array
+        Measured values, and `deviation` (r,) the unit of their residual.
+    labels : Mapping
+        Columns by which rows can be held out, each with r cells.
+    places : list of str
+        Words for the place of each value, such as "at 143 Hz", if it can be measured again; `parts` (r,) numbers the
+        quantities that are measured at a place.
+    interval_kind : str
+        Assumption on the errors of the values.
+    warnings, notes : list of str
+        Sentences for the user on assumptions of the fit.
+    """
+
+    # Number of starting points of a search unless the user gives it.
+    default_starts = 3
+    # What the values are called in messages.
+    values_name = "rows"
+    # Whether evaluations are so expensive that the first descents are quick.
+    is_expensive = False
+    interval_kind = IntervalKind.ROWS
+
+    def __init__(self, keys: FreeKeys, path: Path, measured: np.ndarray, labels: Mapping):
+        self.keys = keys
+        self.path = Path(path)
+        self.measured = measured
+        self.deviation = np.ones(measured.shape)
+        self.labels = labels
+        self.places: list[str] = []
+        self.parts = np.zeros(measured.size)
+        self.warnings: list[str] = []
+        self.notes: list[str] = []
+
+    def compute(self, values: Sequence[float], needed: np.ndarray) -> np.ndarray:
+        """Compute the measured values (r,) for values (n,) [SI] of the keys, those of a mask `needed` (r,) at least."""
+        raise NotImplementedError
+
+    def compare(self, computed: np.ndarray) -> np.ndarray:
+        """Return the residual (r,) of computed values (r,)."""
+        return (computed - self.measured) / self.deviation
+
+    def forget_motions(self) -> None:
+        """Forget earlier results, so that an evaluation does not depend on those before it."""
+
+    def refine(self, values: np.ndarray, training: np.ndarray) -> bool:
+        """Refine the model around fitted values (n,), and return whether the search has to go on.
+
+        `training` (r,) is the mask of the fitted rows.
         """
-        if count <= len(self.ranges):
-            raise PatchfemError(
-                f"{path}: only {count} {name} are used for the fit (what is held out does not count), too few to determine "
-                f"{len(self.ranges)} values and their intervals"
-            )
+        return False
 
-    def make_problem(self, residual: Callable[[np.ndarray], np.ndarray], start=None) -> Problem:
-        """Return the least-squares problem of a residual, a function of the values (n,) [SI] of the keys.
+    def replace_failed_model(self, reason: NotConverged) -> None:
+        """Choose another model after one that failed at all starting points; raise `reason` if there is none."""
+        # if a value of the keys makes the scene invalid, its mistakes are raised instead
+        self.keys.base.override(self.keys.assign(self.keys.bounds[:, 0]))
+        raise reason
 
-        The search begins at the values `start` (n,), or at those of the scene.
-        """
-        low = [bound.low for bound in self.ranges]
-        high = [bound.high for bound in self.ranges]
-        return Problem(residual, low, high, self.start() if start is None else start)
+    def estimate_changes(self, values: np.ndarray) -> np.ndarray:
+        """Return the change (m, r) of the residual by each of m numerical errors of the model at fitted values (n,)."""
+        return np.zeros((0, self.measured.size))
 
-    def widen(self, fit: Fit, changes: np.ndarray) -> Fit:
-        """Return a fit with wider intervals that contain the effect of numerical errors of the model (`Fit.widen`).
+    def find_warnings(self, fitted: "FittedKeys") -> list[str]:
+        """Return warnings about a doubtful fit."""
+        return []
 
-        `changes` (m, r) are the changes of the r residuals by each of m errors.
-        """
-        return fit.widen(changes, [(bound.low, bound.high) for bound in self.ranges])
+    def find_notes(self, fitted: "FittedKeys") -> list[str]:
+        """Return notes on what the intervals contain."""
+        return []
 
-    def make_fitted_keys(self, fit: Fit, warnings: Sequence[str] = ()) -> FittedKeys:
-        """Return the fitted values with their intervals and all warnings, after those of this kind of fit."""
-        undetermined = describe_fit(fit, [bound.key for bound in self.ranges])
-        every = [*self.scene.remarks, *self.notes, *undetermined, *warnings]
-        every += warn_of_bolted_joint(self.scene, self.ranges)
-        return FittedKeys(
-            self.scene,
-            self.ranges,
-            fit,
-            [*self.sets, *self.assign(fit.values)],
-            every,
-            perf_counter() - self.start_time,
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FittedKeys:
+    """Fitted values of the free keys of a scene, with confidence intervals and warnings.
+
+    Attributes
+    ----------
+    comparison : Comparison
+        Measurement and model.
+    fit : Fit
+        Values and intervals of the keys.
+    held_out : (r,) bool
+        Mask of the values that were predicted but not fitted.
+    computed : (r,) array
+        Computed values.
+    left_out : (r,) array
+        Values computed by the fit without the row; NaN if every fit used it.
+    warnings, notes : list of str
+        Sentences for the user on the fit and its assumptions.
+    seconds : float
+        Elapsed time of the fit.
+    """
+
+    comparison: Comparison
+    fit: Fit
+    held_out: np.ndarray
+    computed: np.ndarray
+    left_out: np.ndarray
+    warnings: list[str]
+    notes: list[str]
+    seconds: float
+
+    @property
+    def keys(self) -> FreeKeys:
+        """Free keys of the scene."""
+        return self.comparison.keys
+
+    @property
+    def sets(self) -> list[str]:
+        """The ``table.key=value`` strings of the fitted scene."""
+        return [*self.keys.sets, *self.keys.assign(self.fit.values)]
+
+    def compute_rms(self, mask: np.ndarray) -> float | None:
+        """Return the root mean square residual of the values in a mask (r,); None if there are none."""
+        residual = self.comparison.compare(self.computed)[mask]
+        return np.sqrt(np.mean(residual**2)) if residual.size else None
+
+
+def fit_keys(
+    comparison: Comparison,
+    options: FitOptions = DEFAULT_OPTIONS,
+    listener: Listener = SILENT_LISTENER,
+) -> FittedKeys:
+    """Fit the free keys of a scene to a measurement.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Measurement and model.
+    options : FitOptions
+        Rows that are held out or left out in turn, and the number of starting points.
+    listener : Listener
+        Told the fraction of the descents that are finished.
+
+    Returns
+    -------
+    FittedKeys
+
+    Raises
+    ------
+    SceneError, PatchfemError
+        If the options or a value of the keys are invalid.
+    NotConverged
+        If the model cannot be computed at any starting point.
+    """
+    begin = perf_counter()
+    held_out = np.zeros(comparison.measured.size, bool)
+    for selector in options.hold:
+        held_out |= select_held_out(selector, comparison.path, comparison.labels)
+    groups = []
+    if options.leave_out:
+        labels = comparison.labels
+        groups = group_by_column(options.leave_out, comparison.path, labels, ~held_out)
+    for left_out in (np.zeros_like(held_out), *groups):
+        _require_enough_values(comparison, np.count_nonzero(~held_out & ~left_out))
+
+    n_starts = options.starts or comparison.default_starts
+    n_finished = 0
+
+    def report() -> None:
+        """Report the fraction of the descents that are finished."""
+        nonlocal n_finished
+        n_finished += 1
+        if listener.progress is not None:
+            listener.progress(min(n_finished / (n_starts * (1 + len(groups))), 1.0))
+
+    search = {"is_quick": comparison.is_expensive, "report": report}
+
+    # The fit to all rows that are not held out. Where the model is refined, the search goes on with it.
+    training = ~held_out
+    fit = None
+    for _ in range(MAX_REFINEMENTS):
+        problem = _make_problem(comparison, training, fit)
+        try:
+            fit = problem.search(n_starts if fit is None else 1, **search)
+        except NotConverged as reason:
+            comparison.replace_failed_model(reason)
+            continue
+        if not comparison.refine(fit.values, training):
+            break
+    else:
+        fit = replace(fit, outcome=Outcome.NOT_CONVERGED)
+    fit = problem.add_intervals(fit, comparison.interval_kind)
+    changes = comparison.estimate_changes(fit.values)
+    fit = fit.widen(changes[:, training], comparison.keys.bounds)
+
+    # this fit also predicts the rows that are held out, and fits without a group predict this group
+    comparison.forget_motions()
+    computed = comparison.compute(fit.values, np.ones_like(held_out))
+    left_out = np.full(held_out.size, np.nan)
+    for group in groups:
+        fold = _make_problem(comparison, training & ~group).search(n_starts, **search)
+        comparison.forget_motions()
+        left_out[group] = comparison.compute(fold.values, group)[group]
+
+    fitted = FittedKeys(comparison, fit, held_out, computed, left_out, [], [], 0.0)
+    return replace(
+        fitted,
+        warnings=_collect_warnings(fitted),
+        notes=[*comparison.find_notes(fitted), *comparison.notes, *_advise_repetition(fitted)],
+        seconds=perf_counter() - begin,
+    )
+
+
+def _make_problem(
+    comparison: Comparison, training: np.ndarray, earlier: Fit | None = None
+) -> Problem:
+    """Return the least-squares problem of the rows in a mask (r,), which begins at an earlier fit or at the scene."""
+
+    def residual(values: np.ndarray) -> np.ndarray:
+        """Return the residual of these rows for values (n,) of the keys."""
+        return comparison.compare(comparison.compute(values, training))[training]
+
+    keys = comparison.keys
+    return Problem(residual, *keys.bounds.T, keys.start(), earlier, comparison.forget_motions)
+
+
+def _require_enough_values(comparison: Comparison, count: int) -> None:
+    """Raise PatchfemError if `count` fitted values are too few to determine the keys and their intervals."""
+    n = len(comparison.keys.ranges)
+    if comparison.interval_kind != IntervalKind.KNOWN and count <= n:
+        raise PatchfemError(
+            f"{comparison.path}: only {count} {comparison.values_name} are used for the fit (what is held out does not "
+            f"count), too few to determine {n} values and their intervals"
         )
+
+
+def _collect_warnings(fitted: FittedKeys) -> list[str]:
+    """Return the warnings about a fit: of its scene, its search, its kind, and of a bolted joint."""
+    keys = fitted.keys
+    comparison = fitted.comparison
+    undetermined = describe_fit(fitted.fit, keys.names)
+    own = [*comparison.warnings, *comparison.find_warnings(fitted)]
+    return [*keys.scene.remarks, *undetermined, *own, *warn_of_bolted_joint(keys)]
+
+
+def _advise_repetition(fitted: FittedKeys) -> list[str]:
+    """Return a list with a sentence on the place whose repeated measurement would narrow an interval most, if any.
+
+    The information of a repetition is the sum of g g^T over its quantities, with the change g of a residual per key.
+    """
+    comparison = fitted.comparison
+    if not comparison.places:
+        return []
+    training = ~fitted.held_out
+    names = np.array(comparison.places)[training]
+    parts = comparison.parts[training]
+    places = list(dict.fromkeys(names.tolist()))
+    effects = fitted.fit.intervals.effects
+    information = np.zeros((len(places), effects.shape[1], effects.shape[1]))
+    for k, place in enumerate(places):
+        for part in set(parts[names == place].tolist()):
+            gradient = effects[(names == place) & (parts == part)].mean(axis=0)
+            information[k] += np.outer(gradient, gradient)
+    advice = advise_test(fitted.fit, fitted.keys.names, information, places)
+    return [advice] if advice else []
 
 
 def parse_ranges(texts: Iterable[str]) -> list[Range]:
@@ -197,22 +384,19 @@ def parse_ranges(texts: Iterable[str]) -> list[Range]:
     return ranges
 
 
-def warn_of_bolted_joint(scene: Scene, ranges: Iterable[Range]) -> list[str]:
-    """Return a list with a warning if a free key changes a joint that was bolted in the modal test.
-
-    `ranges` are those of the free keys of the scene. The list is empty otherwise.
-    """
-    structure = scene.structure
+def warn_of_bolted_joint(keys: FreeKeys) -> list[str]:
+    """Return a list with a warning if a free key changes a joint that was bolted in the modal test, else []."""
+    structure = keys.scene.structure
     if structure is None or structure.measured == "free":
         return []
     if name_joint_source(structure) != "written":
         return []
-    keys = [bound.key for bound in ranges if bound.key.startswith(JOINT_TABLES)]
-    if not keys:
+    names = [name for name in keys.names if name.startswith(JOINT_TABLES)]
+    if not names:
         return []
     return [
-        f"the joint of the scene as written is subtracted from the bolted modes for every value of {' and '.join(keys)}; if "
-        'the fitted joint is the one that was bolted in the modal test, set structure.measured_joint = "case"'
+        f"the joint of the scene as written is subtracted from the bolted modes for every value of {' and '.join(names)}; "
+        'if the fitted joint is the one that was bolted in the modal test, set structure.measured_joint = "case"'
     ]
 
 

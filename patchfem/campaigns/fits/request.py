@@ -6,37 +6,42 @@ from pathlib import Path
 from ...core import PatchfemError
 from ...inputs.measured import RESPONSE_COLUMN_UNITS, RESPONSE_TABLE_FORMAT
 from ...inputs.tables import read_text
-from ...model.model import build
+from ...scene.assignments import Range
 from ...scene.files import UNIVERSAL_EXTENSIONS
 from ...scene.scene import Scene
-from ..rows.fit import FittedRows, fit_rows
-from .curve import CURVE_HEADER, CURVE_UNITS, FittedCurve, fit_curve
-from .loop import FittedLoop, fit_hysteresis_loop
+from .curve import CURVE_HEADER, CURVE_UNITS, CurveComparison
+from .loop import LoopComparison
 from .options import FitOptions
-from .problem import Listener, parse_ranges
-from .wear import FittedCoefficient, fit_wear
+from .problem import DEFAULT_OPTIONS, SILENT_LISTENER, FittedKeys, Listener, fit_keys
+from .rows import RowsComparison
+from .wear import DepthComparison
 
-# Kinds of fit that have each option, and to what they fit keys, for the message
-FITS_WITH_OPTION = {
-    "hold": ("loop rows", "a loop under a prescribed slide or rows of a rig"),
-    "leave_out": ("rows", "rows of a rig"),
-    "starts": ("rows curve", "rows of a rig or frequency and damping of a rig against amplitude"),
+# Kinds of measurements
+COMPARISONS = {
+    "loop": LoopComparison,
+    "curve": CurveComparison,
+    "rows": RowsComparison,
+    "wear": DepthComparison,
 }
 
 
 def fit_measurement(
-    scene: Scene, to: str, free: Sequence[str], options: FitOptions, listener: Listener
-) -> FittedLoop | FittedCurve | FittedRows | FittedCoefficient:
+    scene: Scene,
+    to: str | Path,
+    ranges: Sequence[Range],
+    options: FitOptions = DEFAULT_OPTIONS,
+    listener: Listener = SILENT_LISTENER,
+) -> FittedKeys:
     """Fit keys of a scene to a measurement.
 
     Parameters
     ----------
     scene : Scene
         Its kind decides which measurements can be fitted.
-    to : str
+    to : str or Path
         File of the measurement, or a measured depth.
-    free : sequence of str
-        Free keys with their ranges, "table.key=low..high".
+    ranges : sequence of Range
+        Free keys with their ranges.
     options : FitOptions
         Options of the search and of the rows.
     listener : Listener
@@ -44,7 +49,7 @@ def fit_measurement(
 
     Returns
     -------
-    FittedLoop, FittedCurve, FittedRows or FittedCoefficient
+    FittedKeys
 
     Raises
     ------
@@ -53,19 +58,12 @@ def fit_measurement(
     NotConverged
         If the model cannot be computed at any starting point.
     """
-    kind = choose_kind(scene, to)
+    kind = choose_kind(scene, str(to))
     check_options(kind, options)
-    if not to:
+    if not to or not ranges:
         raise PatchfemError("--to MEASURED and --free KEYS are needed")
-    ranges = parse_ranges(free)
-    if kind == "wear":
-        return fit_wear(build(scene), to, ranges, listener.progress)
-    path = Path(to)
-    if kind == "curve":
-        return fit_curve(scene, path, ranges, options)
-    if kind == "loop":
-        return fit_hysteresis_loop(scene, path, ranges, options, listener.say)
-    return fit_rows(scene, path, ranges, options, listener)
+    comparison = COMPARISONS[kind](scene, to, ranges, listener)
+    return fit_keys(comparison, options, listener)
 
 
 def choose_kind(scene: Scene, to: str) -> str:
@@ -96,11 +94,12 @@ def choose_kind(scene: Scene, to: str) -> str:
 
 
 def check_options(kind: str, options: FitOptions) -> None:
-    """Raise PatchfemError if an option is invalid or does not belong to `kind` of fit, such as "rows"."""
-    for name, (kinds, target) in FITS_WITH_OPTION.items():
-        if getattr(options, name) and kind not in kinds.split():
+    """Raise PatchfemError if an option is invalid or does not belong to `kind` of fit: a worn depth has no rows."""
+    for name in ("hold", "leave_out", "starts"):
+        if getattr(options, name) and kind == "wear":
             raise PatchfemError(
-                f"--{name.replace('_', '-')} applies only to fits to {target}; leave this option out"
+                f"--{name.replace('_', '-')} applies only to fits to rows of a table, not to a worn depth; leave this "
+                "option out"
             )
     starts = options.starts
     if starts is not None and (not isinstance(starts, int) or starts < 1):

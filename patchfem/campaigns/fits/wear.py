@@ -1,43 +1,46 @@
-"""Fit of the wear coefficient to a measured worn depth, with its interval.
+"""Comparison of a worn depth with that of a scene, which gives the wear coefficient.
 
-The worn depth depends only on the product of coefficient and cycles, so one run with the largest
-coefficient gives the depth for all smaller ones. The coefficient is interpolated from this curve, and
-then checked and corrected by further runs. A last run with error estimates gives the numerical error of
-the depth, by which the interval is widened.
+The worn depth depends almost only on the product of coefficient and cycles, so one run with the largest
+coefficient gives the depth for all smaller ones. A factor corrects this curve by runs with the fitted coefficient. A last
+run with error estimates gives the numerical error of the depth, by which the interval is widened.
 """
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ...core import Measure, Missing, NotConverged, PatchfemError
+from ...core import Missing, NotConverged, PatchfemError
+from ...formatting import format_length
+from ...identify.intervals import IntervalKind
 from ...inputs.damage import refuse_damage
-from ...model.model import Model
 from ...runs.patch import mesh_levels
 from ...runs.run import run
 from ...runs.wear import evolve
 from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
+from ...scene.scene import Scene
+from .problem import SILENT_LISTENER, Comparison, FittedKeys, FreeKeys, Listener
 
 MAX_WORN_DEPTH_NAME = "worn_depth_max"
 # Names of the wear depths in compare.json, the more accurate one first.
 WORN_DEPTH_NAMES = ("worn_depth_mean", MAX_WORN_DEPTH_NAME)
 # Names in compare.json of the part that two measured surfaces of a piece have in common
 COMMON_PART_NAMES = {"common_length", "common_area"}
-MAX_WEAR_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
 # Largest relative difference of computed and measured depth, over the tolerance, at which the search ends.
 MAX_DEPTH_ERROR_OVER_TOLERANCE = 0.1
+# Standard deviation of a depth that is given without an interval, relative to the depth; it keeps its weight finite
+MIN_RELATIVE_DEVIATION = 1e-9
+# Half-width of a 95 % interval in standard deviations
+HALF_WIDTH = 1.96
 # Scene key of the wear coefficient [m2/N], the only one that is fitted to a wear depth
 COEFFICIENT_KEY = "wear.coefficient"
 
 
-@dataclass(frozen=True, slots=True)
-class MeasuredDepth:
+class MeasuredDepth(NamedTuple):
     """Measured wear depth with its interval.
 
     - name: one of WORN_DEPTH_NAMES.
@@ -53,67 +56,13 @@ class MeasuredDepth:
     source: str
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class FittedCoefficient:
-    """Fitted wear coefficient with its interval.
-
-    Attributes
-    ----------
-    value, low, high : float
-        Coefficient [m2/N] and its interval, which contains those of the measured and of the computed depth.
-    measured : MeasuredDepth
-        Wear depth to which the coefficient is fitted.
-    model : Measure
-        Wear depth that is computed with the fitted coefficient [m]. If its error is unknown, the interval lacks it.
-    bounds : Range
-        Bounds of the search.
-    runs : int
-        Number of wear runs.
-    curve : (2, j) array
-        Coefficients up to the upper bound [m2/N], and the wear depths with them [m].
-    """
-
-    value: float
-    low: float
-    high: float
-    measured: MeasuredDepth
-    model: Measure
-    bounds: Range
-    runs: int
-    curve: np.ndarray
-
-
-class WearCurve(NamedTuple):
-    """Wear depth (j,) [m] as a function of the completed fraction of the cycles (j,)."""
-
-    fraction: np.ndarray
-    depth: np.ndarray
-
-
-class FoundCoefficient(NamedTuple):
-    """Wear coefficient without its interval.
-
-    - value: coefficient [m2/N].
-    - depth: depth of a run with it [m].
-    - curve: depth with the upper bound of the coefficient.
-    - inverse: function of a depth [m] on this curve that returns the fraction of the cycles.
-    - runs: number of wear runs.
-    """
-
-    value: float
-    depth: float
-    curve: WearCurve
-    inverse: PchipInterpolator
-    runs: int
-
-
 def read_measured_depth(text: str) -> MeasuredDepth:
     """Read a measured depth of both pieces from a text, or from a JSON file that `compare` writes for two runs.
 
     The text has the form "worn_depth_max=2.5 um..3.5 um", or gives a single value, or is the name of the file. Raises
     PatchfemError for an invalid depth and Missing for a missing file.
     """
-    name, equals, value = (part.strip() for part in text.partition("="))
+    name, equals, value = (part.strip() for part in str(text).partition("="))
     if not equals:
         return _read_depth_file(Path(text))
     if name not in WORN_DEPTH_NAMES:
@@ -173,199 +122,133 @@ def _read_depth_file(path: Path) -> MeasuredDepth:
     )
 
 
-def fit_wear(
-    model: Model, measured_depth: str, ranges: Sequence[Range], progress: Callable | None = None
-) -> FittedCoefficient:
-    """Fit the wear coefficient so that the computed worn depth equals the measured one.
+class DepthComparison(Comparison):
+    """Worn depth (1,) [m], measured and of a scene with wear.
 
     Parameters
     ----------
-    model : Model
-        Model with wear.
-    measured_depth : str
+    scene : Scene
+        Scene of a patch with wear.
+    path : str
         Measured depth, in the format of `read_measured_depth`.
     ranges : sequence of Range
         Bounds of the coefficient alone.
-    progress : Callable, optional
-        Called with the completed fraction of a run.
-
-    Returns
-    -------
-    FittedCoefficient
+    listener : Listener
+        Told the completed fraction of a run.
 
     Raises
     ------
     SceneError, PatchfemError
         If the input is invalid, or if no coefficient within the range gives the depth.
-    NotConverged
-        If the runs do not converge to a coefficient.
     """
-    if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
-        raise PatchfemError(
-            f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example {COEFFICIENT_KEY}=1e-16 "
-            "m^2/N..1e-12 m^2/N"
-        )
 
-    # The measured depth needs a patch without earlier wear.
-    bounds = ranges[0]
-    target = read_measured_depth(measured_depth)
-    if model.patch is None:
-        raise PatchfemError(
-            f"--to {target.name}: a [normal] contact has no worn depth; use [contact]", "normal"
-        )
-    if model.wear.start is not None:
-        raise PatchfemError(
-            f"fit {COEFFICIENT_KEY}: the fit must start from unworn pieces; leave out wear.start",
-            "wear.start",
-        )
+    default_starts = 1
+    interval_kind = IntervalKind.KNOWN
 
-    # The contact of the unworn pieces does not depend on the coefficient.
-    patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+    def __init__(
+        self,
+        scene: Scene,
+        path: str,
+        ranges: Sequence[Range],
+        listener: Listener = SILENT_LISTENER,
+    ):
+        if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
+            raise PatchfemError(
+                f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example "
+                f"{COEFFICIENT_KEY}=1e-16 m^2/N..1e-12 m^2/N"
+            )
+        self.depth = depth = read_measured_depth(path)
+        super().__init__(FreeKeys(scene, ranges), depth.source, np.array([depth.value]), {})
+        self.progress = listener.progress
 
-    def compute(coefficient: float) -> WearCurve:
-        """Compute the wear depth over the cycles for a wear coefficient [m2/N]."""
-        return _compute_wear_curve(model, patch, coefficient, target.name, progress)
+        # The measured depth needs a patch without earlier wear.
+        low, high = self.keys.bounds[0]
+        model = self.keys.build_model([high])
+        if model.patch is None:
+            raise PatchfemError(
+                f"--to {depth.name}: a [normal] contact has no worn depth; use [contact]", "normal"
+            )
+        if model.wear.start is not None:
+            raise PatchfemError(
+                f"fit {COEFFICIENT_KEY}: the fit must start from unworn pieces; leave out wear.start",
+                "wear.start",
+            )
 
-    found = _search_coefficient(
-        compute, target, bounds, MAX_DEPTH_ERROR_OVER_TOLERANCE * model.accuracy.tolerance
-    )
-    value = found.value
-    area = float(patch.pieces.interface.weight.sum())
-    error = _estimate_depth_error(model, value, target, area, progress)
+        # The contact of the unworn pieces does not depend on the coefficient.
+        self.patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+        self.curve = self._compute_curve(high)
+        self.interpolate = PchipInterpolator(*self.curve)
+        self.factor = 1.0
+        smallest = float(self.interpolate(low))
+        largest = self.curve[1, -1]
+        if not smallest <= depth.value <= largest:
+            side = "lower the low" if depth.value < smallest else "raise the high"
+            raise PatchfemError(
+                f"--free {COEFFICIENT_KEY}: within these bounds {depth.name} is {format_length(smallest, 4)} to "
+                f"{format_length(largest, 4)}, but {format_length(depth.value, 4)} was measured; {side} bound, unless the "
+                "coating is worn through"
+            )
 
-    # The depth depends almost only on the product of coefficient and cycles. So the curve of the depth gives the
-    # coefficients at both ends of the measured interval, which the error of the computed depth widens.
-    curve = found.curve
-    ends = np.array([target.low - (error or 0.0), target.high + (error or 0.0)])
-    ends = found.inverse(np.clip(ends, curve.depth[0], curve.depth[-1]))
-    low, high = value * ends / found.inverse(target.value)
-    return FittedCoefficient(
-        value=value,
-        low=float(low),
-        high=float(high),
-        measured=target,
-        model=Measure(found.depth, "m", error),
-        bounds=bounds,
-        runs=found.runs + 1,
-        curve=np.array([bounds.high * curve.fraction, curve.depth]),
-    )
+    def _compute_curve(self, coefficient: float) -> np.ndarray:
+        """Compute coefficients [m2/N] up to a given one, and the depths [m] with them (2, j), from the course of one run."""
+        model = self.keys.build_model([coefficient])
+        worn = evolve.compute_wear(model, self.patch, (None, None), self.progress)
+        if worn.stopped:
+            raise PatchfemError(f"fit {COEFFICIENT_KEY}: {worn.stopped}")
+        area = self.patch.pieces.interface.weight.ravel()
+        depths = np.array([moment.depth.ravel() for moment in worn.moments])
+        is_max = self.depth.name == MAX_WORN_DEPTH_NAME
+        depth = depths.max(axis=1) if is_max else depths @ area / area.sum()
+        cycles = np.array([moment.cycle for moment in worn.moments])
+        return np.array([coefficient * cycles / model.wear.cycles, depth])
 
+    def compute(self, values: Sequence[float], needed: np.ndarray) -> np.ndarray:
+        """Return the depth (1,) [m] with a coefficient, from the corrected curve."""
+        return self.factor * self.interpolate(values)
 
-def _search_coefficient(
-    compute: Callable[[float], WearCurve], target: MeasuredDepth, bounds: Range, tolerance: float
-) -> FoundCoefficient:
-    """Find the wear coefficient whose computed depth equals the measured one.
+    def compare(self, computed: np.ndarray) -> np.ndarray:
+        """Return the distance (1,) from the measured depth, in standard deviations of the interval on this side."""
+        end = np.where(computed < self.measured, self.depth.low, self.depth.high)
+        half_width = np.maximum(np.abs(end - self.measured), MIN_RELATIVE_DEVIATION * self.measured)
+        return HALF_WIDTH * (computed - self.measured) / half_width
 
-    Parameters
-    ----------
-    compute : callable
-        Function of a wear coefficient [m2/N] that runs the wear with it.
-    target : MeasuredDepth
-        Measured depth.
-    bounds : Range
-        Bounds of the coefficient.
-    tolerance : float
-        Largest relative difference of both depths.
+    def refine(self, values: np.ndarray, training: np.ndarray) -> bool:
+        """Correct the curve by a run with the fitted coefficient, and return whether the depth has changed."""
+        depth = self._compute_curve(values[0])[1, -1]
+        correction = float(depth / self.compute(values, training)[0])
+        self.factor *= correction
+        tolerance = MAX_DEPTH_ERROR_OVER_TOLERANCE * self.keys.scene.accuracy.tolerance
+        return abs(correction - 1) > tolerance
 
-    Raises
-    ------
-    PatchfemError
-        If no coefficient within the bounds gives the depth.
-    NotConverged
-        If MAX_WEAR_RUNS runs do not meet the tolerance.
-    """
-    # One run with the largest coefficient gives the depth for all smaller ones.
-    curve = compute(bounds.high)
-    max_depth = curve.depth[-1]
-    if not max_depth >= target.value:
-        raise PatchfemError(
-            f"--free {COEFFICIENT_KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
-            f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; raise the high bound, "
-            "unless the coating is worn through"
-        )
+    def estimate_changes(self, values: np.ndarray) -> np.ndarray:
+        """Return the distance (1, 1) of the exact depth with a coefficient from the computed one, as a residual.
 
-    # The interpolated coefficient is corrected until a run with it has the measured depth.
-    is_growing = np.diff(curve.depth, prepend=-1.0) > 0
-    inverse = PchipInterpolator(
-        curve.depth[is_growing], curve.fraction[is_growing], extrapolate=False
-    )
-    value = float(bounds.high * inverse(target.value))
-    n_runs = 1
-    while n_runs < MAX_WEAR_RUNS:
-        n_runs += 1
-        depth = float(compute(value).depth[-1])
-        if abs(depth / target.value - 1) <= tolerance:
-            break
-        value *= float(inverse(target.value) / inverse(depth))
-    else:
-        raise NotConverged(
-            f"fit {COEFFICIENT_KEY}: after {MAX_WEAR_RUNS} runs the fit has reached only {target.name} = "
-            f"{depth:.6g} in place of {target.value:.6g}"
-        )
+        That is the distance of the depth of a run, whose meshes may be finer than those of the fit, and its error.
+        """
+        self.error = None
+        try:
+            measures = run(self.keys.build_model(values), progress=self.progress).measures
+        except (NotConverged, Missing):
+            measures = {}
+        # The mean depth is the worn volume over the area.
+        is_max = self.depth.name == MAX_WORN_DEPTH_NAME
+        measure = measures.get(self.depth.name if is_max else "worn_volume")
+        if measure is None or measure.error is None:
+            self.warnings.append(
+                "the numerical error of the computed depth is unknown, so the interval of the coefficient does not contain "
+                "it"
+            )
+            return np.zeros((0, 1))
+        area = 1.0 if is_max else float(self.patch.pieces.interface.weight.sum())
+        self.error = abs(measure.value / area - self.measured[0]) + measure.error / area
+        slope = np.ptp(self.compare(self.measured * np.array([1 - 1e-6, 1 + 1e-6]))) / 2e-6
+        return np.array([[self.error * slope / self.measured[0]]])
 
-    if value < bounds.low:
-        raise PatchfemError(
-            f"--free {COEFFICIENT_KEY}: {target.name} = {target.value:.4g} needs a coefficient of {value:.4g} "
-            f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound"
-        )
-    return FoundCoefficient(value, depth, curve, inverse, n_runs)
-
-
-def _estimate_depth_error(
-    model: Model, coefficient: float, target: MeasuredDepth, area: float, progress
-) -> float | None:
-    """Estimate how far the exact depth with a wear coefficient [m2/N] may be from the measured one.
-
-    That is the distance of the depth of a run, whose meshes may be finer than those of the fit, and its error.
-
-    Parameters
-    ----------
-    model : Model
-        Model with wear.
-    coefficient : float
-        Fitted coefficient [m2/N].
-    target : MeasuredDepth
-        Measured depth.
-    area : float
-        Area of the patch [m2].
-    progress : callable or None
-        Called with the completed fraction of the run.
-
-    Returns
-    -------
-    float or None
-        Distance [m], or None if the run has no error.
-    """
-    model = replace(model, wear=replace(model.wear, coefficient=coefficient))
-    try:
-        result = run(model, progress=progress)
-    except (NotConverged, Missing):
-        return None
-
-    # The mean depth is the worn volume over the area.
-    name = target.name
-    divisor = 1.0
-    if name != MAX_WORN_DEPTH_NAME:
-        name = "worn_volume"
-        divisor = area
-    measure = result.measures.get(name)
-    if measure is None or measure.error is None:
-        return None
-    return float(abs(measure.value / divisor - target.value) + measure.error / divisor)
-
-
-def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
-    """Compute the wear depth of a model over the cycles for a wear coefficient [m2/N].
-
-    `patch` is the solved contact of the unworn pieces, `name` one of WORN_DEPTH_NAMES, and `progress` is called with the
-    progress, or None.
-    """
-    model = replace(model, wear=replace(model.wear, coefficient=coefficient))
-    worn = evolve.compute_wear(model, patch, (None, None), progress)
-    if worn.stopped:
-        raise PatchfemError(f"fit {COEFFICIENT_KEY}: {worn.stopped}")
-    area = patch.pieces.interface.weight.ravel()
-    depths = np.array([moment.depth.ravel() for moment in worn.moments])
-    depth = depths.max(axis=1) if name == MAX_WORN_DEPTH_NAME else depths @ area / area.sum()
-    fraction = np.array([moment.cycle for moment in worn.moments]) / model.wear.cycles
-    return WearCurve(fraction, depth)
+    def find_warnings(self, fitted: FittedKeys) -> list[str]:
+        """Return a warning about a depth that is given without an interval."""
+        if self.depth.low < self.depth.high:
+            return []
+        return [
+            f"{self.depth.name} was given without an interval, so that of the coefficient does not contain the error of the "
+            f'measurement; give both ends, such as "{self.depth.name}=2.5 um..3.5 um"'
+        ]

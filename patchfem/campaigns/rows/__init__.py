@@ -1,12 +1,11 @@
-"""Fit of a rig to a table of measured responses, such as Table 1 of the report.
+"""Comparison of a rig with a table of measured responses, such as Table 1 of the report.
 
-In: a scene of a rig, rows of frequency, input, acceleration and displacement, ranges of the free
-parameters, and validation rows. Out: fitted values with confidence intervals, and scores of the
-fitted, the held-out and the left-out readings.
+In: a scene of a rig, rows of frequency, input, acceleration and displacement, and free keys. Out: measured and computed
+readings for values of the keys, and scores of the fitted, the held-out and the left-out readings.
 
 - `cells`: readings of the table
 - `condition_models`: models of the rig at the measured conditions
 - `model_readings`: readings that these models predict
 
-Read `fit` first.
+Read `cells` first; `fits.rows` fits the rig.
 """

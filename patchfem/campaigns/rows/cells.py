@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...inputs.measured import MeasuredRow, read_table
-from ..held_out import EQUAL_NUMBERS_TOL, find_cells, format_cell, select_held_out
+from ..fits.held_out import EQUAL_NUMBERS_TOL, select_held_out
 
 # Lower limit of a displacement [m] in a log ratio: the resolution of the printed table, 0.01 mil.
 MIN_COMPARED_DISPLACEMENT = 0.01 * 25.4e-6
@@ -77,22 +77,8 @@ class Readings:
         """
         return select_held_out(selector, self.path, self.columns)
 
-    def group_by_column(self, name: str, selected: np.ndarray) -> dict[str, np.ndarray]:
-        """Group the readings of a mask `selected` (n,) by the values of the table column `name`.
-
-        Returns masks (n,) by the text of the value, in the order of the rows.
-        """
-        groups: dict[str, np.ndarray] = {}
-        for reading, value in enumerate(find_cells(self.columns, name, self.path)):
-            if selected[reading]:
-                group = groups.setdefault(format_cell(name, value), np.zeros(selected.size, bool))
-                group[reading] = True
-        return groups
-
-    def compute_log_ratios(self, acceleration, displacement) -> np.ndarray:
-        """Return the log ratio ln(computed/measured) (n,) of each reading.
-
-        The ratio is NaN if no motion was computed, and MAX_LOG_RATIO if the motion is not finite.
+    def select_computed(self, acceleration, displacement) -> np.ndarray:
+        """Return the computed value (n,) of each reading.
 
         Parameters
         ----------
@@ -100,12 +86,22 @@ class Readings:
             Accelerations [m s-2] and displacement amplitudes [m] at the conditions.
         """
         at_conditions = np.array([displacement, acceleration], float)
-        computed = at_conditions[self.is_acceleration.astype(int), self.condition]
+        return at_conditions[self.is_acceleration.astype(int), self.condition]
+
+    def compute_logs(self, computed: np.ndarray) -> np.ndarray:
+        """Return the log ratio ln(computed/measured) (n,) of computed values (n,).
+
+        The ratio is NaN if no motion was computed, and MAX_LOG_RATIO if the motion is not finite.
+        """
         lower_limit = np.where(self.is_acceleration, 1e-300, MIN_COMPARED_DISPLACEMENT)
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.log(np.maximum(computed, lower_limit))
             ratio -= np.log(np.maximum(self.measured, lower_limit))
         return np.clip(ratio, -MAX_LOG_RATIO, MAX_LOG_RATIO)
+
+    def compute_log_ratios(self, acceleration, displacement) -> np.ndarray:
+        """Return the log ratios (n,) of accelerations [m s-2] and displacements [m] (c,) at the conditions."""
+        return self.compute_logs(self.select_computed(acceleration, displacement))
 
 
 def _number_values(values) -> np.ndarray:

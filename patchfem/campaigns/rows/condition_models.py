@@ -63,7 +63,8 @@ class ConditionModels(FreeKeys):
                     "the scene does not set accuracy.method, so the steady motions are computed with the method "
                     "'harmonic'"
                 )
-        super().__init__(scene, ranges, sets, notes)
+        super().__init__(scene, ranges, sets)
+        self.notes = notes
 
         self.instrument = self.base.scene.measured
         self.model_parameters = [k for k, bound in enumerate(ranges) if bound.key not in GAIN_KEYS]

@@ -6,13 +6,12 @@ from command_line import run_cli
 from measured_rows import make_linear_rows, write_rows
 
 from patchfem import SceneError, run
-from patchfem.campaigns.fits.problem import FitOptions
+from patchfem.campaigns.fits.problem import FitOptions, fit_keys
+from patchfem.campaigns.fits.rows import RowsComparison
 from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.campaigns.rows.condition_models import ConditionModels
-from patchfem.campaigns.rows.fit import fit_rows, make_residual
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N, PatchfemError
-from patchfem.export.fits import describe_rows_fit
 from patchfem.scene import BOUNDS_FORM, load, loads, read_assignments
 
 LINEAR = """
@@ -71,7 +70,17 @@ def read_free_keys(*texts):
 def fit_to_rows(scene, path, wanted, **beside):
     """Fit a scene to rows and return the result."""
     options = FitOptions(**{"starts": 2} | beside)
-    return fit_rows(scene, path, wanted, options, seed=0)
+    return fit_keys(RowsComparison(scene, path, wanted), options)
+
+
+def logs(found, computed):
+    """Return ln(computed/measured) of the readings."""
+    return found.comparison.cells.compute_logs(computed)
+
+
+def score(found, group):
+    """Return the score of a group of readings, such as "fitted"."""
+    return found.comparison.compute_scores(found)[group]["all"]
 
 
 LINEAR_FREE = (
@@ -88,14 +97,8 @@ def test_exact_linear_rig_is_recovered_from_closed_form(tmp_path):
         read_free_keys(*LINEAR_FREE, *gains),
         starts=3,
     )
-    assert found.keys.fit.values == pytest.approx([141.0, 0.03, 1.3, 0.8], rel=1e-6)
-    assert describe_rows_fit(found).details["reading"] == {
-        "reading": "peak",
-        "reading_cutoff": None,
-        "acceleration_gain": found.keys.fit.values[2],
-        "displacement_gain": found.keys.fit.values[3],
-    }
-    assert found.compute_scores()["fitted"]["all"] < 1e-6
+    assert found.fit.values == pytest.approx([141.0, 0.03, 1.3, 0.8], rel=1e-6)
+    assert score(found, "fitted") < 1e-6
 
 
 RUBS_FREE = ("friction.static=0.3..0.6,structure.bonded.stiffness=1e6 N/m..6e6 N/m",)
@@ -141,20 +144,22 @@ def test_always_held_out_rows_do_not_affect_fit(tmp_path):
         fit_to_rows(scene, write_rows(tmp_path, each), wanted, hold=("frequency=150 Hz",))
         for each in (rows, other)
     )
-    assert np.array_equal(first.keys.fit.values, second.keys.fit.values)
-    assert np.array_equal(first.keys.fit.descent_rms, second.keys.fit.descent_rms)
-    assert not np.array_equal(first.logs, second.logs)
+    assert np.array_equal(first.fit.values, second.fit.values)
+    assert np.array_equal(first.fit.descent_rms, second.fit.descent_rms)
+    assert not np.array_equal(
+        first.computed / first.comparison.measured, second.computed / second.comparison.measured
+    )
     one, two = (
         fit_to_rows(scene, write_rows(tmp_path, each), wanted, leave_out="frequency", starts=1)
         for each in (rows, other)
     )
     # the fit without 150 Hz does not see the changed readings, the other fits do
-    is_changed = one.cells.conditions[one.cells.condition][:, 0] == 150
-    change = two.left_out_logs - one.left_out_logs
-    expected = np.where(one.cells.is_acceleration, -np.log(3), np.log(2))
+    is_changed = one.comparison.cells.conditions[one.comparison.cells.condition][:, 0] == 150
+    change = logs(two, two.left_out) - logs(one, one.left_out)
+    expected = np.where(one.comparison.cells.is_acceleration, -np.log(3), np.log(2))
     assert change[is_changed] == pytest.approx(expected[is_changed], abs=1e-12)
     assert np.abs(change[~is_changed]).min() > 0
-    assert one.compute_scores()["left_out"]["all"] < 1e-3 < two.compute_scores()["left_out"]["all"]
+    assert score(one, "left_out") < 1e-3 < score(two, "left_out")
 
 
 def test_exact_fit_readings_equal_marched_rows(tmp_path, friction_rows):
@@ -207,21 +212,19 @@ def test_exact_rows_flagged_u_are_lower_bounds(tmp_path):
     path = write_rows(
         tmp_path, [(*row[:4], "U" if row[0] == 143 else "") for row in make_linear_rows()]
     )
-    cells = read_response_table(path)
     scene = write_and_load(tmp_path, LINEAR)
-    computed = ModelReadings(
-        ConditionModels(scene, cells.conditions, read_free_keys(*LINEAR_FREE), path)
-    )
-    every = np.ones(cells.row.size, bool)
+    comparison = RowsComparison(scene, path, read_free_keys(*LINEAR_FREE))
+    unstable = comparison.cells.unstable
     for damping, is_above in ((0.01, True), (0.1, False)):
-        logs = cells.compute_log_ratios(*computed([141.0, damping], range(5)))
-        found = make_residual(cells, computed, every)([141.0, damping])
-        assert np.all(logs[cells.unstable] > 0) == is_above
-        assert np.array_equal(found, np.where(cells.unstable, np.minimum(logs, 0), logs))
+        computed = comparison.compute([141.0, damping], np.ones(unstable.size, bool))
+        ratios = comparison.cells.compute_logs(computed)
+        found = comparison.compare(computed)
+        assert np.all(ratios[unstable] > 0) == is_above
+        assert np.array_equal(found, np.where(unstable, np.minimum(ratios, 0), ratios))
     stable = fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1)
-    whole, without = (stable.compute_scores(only_stable=part)["fitted"] for part in (False, True))
-    assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[~cells.unstable] ** 2)))
-    assert whole != without
+    ratios = logs(stable, stable.computed)[~unstable]
+    assert score(stable, "stable") == pytest.approx(np.sqrt(np.mean(ratios**2)))
+    assert score(stable, "stable") != score(stable, "fitted")
 
 
 def test_always_unbounded_motion_has_capped_residual(tmp_path):
@@ -239,9 +242,9 @@ def test_always_unbounded_motion_has_capped_residual(tmp_path):
         read_free_keys("measured.acceleration_gain=0.5..2"),
         starts=1,
     )
-    assert found.keys.fit.counts.failures == 0
-    assert any("no bounded motion is found at 143 Hz" in text for text in found.keys.warnings)
-    assert np.abs(found.logs).max() == pytest.approx(np.log(1e3))
+    assert found.fit.counts.failures == 0
+    assert any("no bounded motion is found at 143 Hz" in text for text in found.warnings)
+    assert np.abs(logs(found, found.computed)).max() == pytest.approx(np.log(1e3))
 
 
 @pytest.mark.parametrize(
@@ -292,4 +295,4 @@ def test_exact_fit_uses_reading_and_gains_of_scene(tmp_path):
         "measured.displacement_gain=0.8",
     )
     fit = fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1)
-    assert fit.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
+    assert fit.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)

@@ -96,7 +96,7 @@ def test_exact_fit_recovers_parameters_of_loop(
         guess = guess.replace(value, initial_value)
     assert fit_law(
         tmp_path, guess, (time, slide, force), free_parameters
-    ).keys.fit.values == pytest.approx(values, rel=1e-5)
+    ).fit.values == pytest.approx(values, rel=1e-5)
 
 
 TANH = 'law = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'

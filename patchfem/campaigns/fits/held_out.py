@@ -5,14 +5,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import PatchfemError
-from ..inputs.damage import shorten
-from ..scene.keys.quantities import parse_quantity
+from ...core import PatchfemError
+from ...inputs.damage import shorten
+from ...scene.keys.quantities import parse_quantity
 
 MAX_LISTED_VALUES_CHARACTERS = 200  # largest number of characters of a list of values in a message
 EQUAL_NUMBERS_TOL = 1e-9  # largest relative difference at which two numbers count as equal
 # Kind of quantity and unit of each column of numbers by which rows can be selected
-NUMBER_UNITS = {"frequency": ("frequency", "Hz"), "input": ("acceleration", "m/s^2")}
+NUMBER_UNITS = {
+    "frequency": ("frequency", "Hz"),
+    "input": ("acceleration", "m/s^2"),
+    "amplitude": ("length", "m"),
+}
 
 
 def find_cells(columns: Mapping[str, Sequence], name: str, path: Path) -> Sequence:
@@ -92,6 +96,42 @@ def format_cell(name: str, cell: float | str) -> str:
     if isinstance(cell, str):
         return cell or "(none)"
     return f"{cell:.6g} {NUMBER_UNITS[name][1]}"
+
+
+def group_by_column(
+    name: str, path: Path, columns: Mapping[str, Sequence[float | str]], selected: np.ndarray
+) -> list[np.ndarray]:
+    """Group selected rows by their value in the column of the option --leave-out.
+
+    Parameters
+    ----------
+    name : str
+        Column.
+    path : Path
+        Table, for messages.
+    columns : Mapping
+        As in `select_held_out`.
+    selected : (n,) bool array
+        Rows that are grouped.
+
+    Returns
+    -------
+    list of (n,) bool array
+        Masks of the groups, in the order of the rows.
+
+    Raises
+    ------
+    PatchfemError
+        If rows cannot be selected by this column, or if all rows have the same value.
+    """
+    texts = np.array([format_cell(name, cell) for cell in find_cells(columns, name, path)])
+    groups = [selected & (texts == text) for text in dict.fromkeys(texts[selected].tolist())]
+    if len(groups) == 1:
+        raise PatchfemError(
+            f"--leave-out {name}: all rows that are not held out have the same value in this column, so leaving this value "
+            "out leaves no rows for the fit; choose another column"
+        )
+    return groups
 
 
 def _has_value(name: str, cell: float | str, text: str) -> bool:
