@@ -13,12 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import friction, hybrid, slip
-from ...convergence import ERROR_SAFETY_FACTOR
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
 from ...response.coarser import CoarserRuns, ComparisonRuns, second_order_errors
 from ...response.errors import (
-    absolute_change,
     convergence_errors,
     estimate_sampling_errors,
     finer_errors,
@@ -36,10 +34,6 @@ COMPARISON_MERGE_WIDTH_FACTOR = 0.5
 # Largest ratio of the neglected tail of a sum over bonds to the tolerance at which no run with a
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
-LINEAR_METHOD = "exact"  # value of accuracy.method that a linear rig takes too
-LINEAR_ROUND_OFF = (
-    1e-11  # error of a sum or an extreme over all steps of a linear motion, relative to its value
-)
 # Ratio of the neglected tail in the comparison run to that in the run itself.
 COMPARISON_TAIL_FACTOR = 0.1
 
@@ -298,21 +292,6 @@ def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> 
     return [own, *_list_hybrid_space_runs(model, numerics, patch, coarse, solution)]
 
 
-def _list_linear_time_runs(model: Model, numerics) -> ComparisonRuns:
-    """List the run of a linear rig with half the steps of `numerics`, by comparison with which its errors are estimated."""
-    return [CoarserRuns((_divide_steps(numerics, 2),), _estimate_linear_errors)]
-
-
-def _estimate_linear_errors(values: Values, coarse_values: Values) -> Values:
-    """Return the errors of the measures of a linear rig from those of a run with half the steps: steps and round-off."""
-    errors = {}
-    for name, value in values.items():
-        change = absolute_change({name: value}, coarse_values).get(name, abs(value))
-        errors[name] = ERROR_SAFETY_FACTOR * change + LINEAR_ROUND_OFF * abs(value)
-    return errors
-
-
-LINEAR = Engine("linear", "", _list_linear_time_runs, lambda *inputs: [])
 HYBRID = Engine("hybrid", "exact", _list_hybrid_time_runs, _list_hybrid_space_runs)
 MARCH = Engine("march", "march", _list_march_time_runs, _list_march_space_runs, has_steps=True)
 HARMONIC = Engine(
@@ -322,7 +301,7 @@ HARMONIC = Engine(
     _list_steady_space_runs,
     finds_periodic_motion=True,
 )
-ENGINES = {engine.name: engine for engine in (LINEAR, HYBRID, MARCH, HARMONIC)}
+ENGINES = {engine.name: engine for engine in (HYBRID, MARCH, HARMONIC)}
 
 
 @lru_cache(8)
@@ -333,9 +312,6 @@ def choose_engine(model: Model) -> Engine:
     possible, else in time steps. All engines solve the same equations, so the choice affects the time and the errors of a
     run, but not its meaning; the summary of a run names its engine.
     """
-    is_free = model.accuracy.method in ("auto", LINEAR_METHOD)
-    if is_free and not LINEAR.find_unsupported_feature(model):
-        return LINEAR
     for engine in ENGINES.values():
         if engine.method == model.accuracy.method:
             return engine

@@ -12,9 +12,8 @@ from ... import hybrid
 from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import find_min_decay_rate, is_sinusoidal
-from . import linear
 from .costs import steps_per_cycle
-from .engines import HYBRID, LINEAR, MARCH, choose_engine
+from .engines import HYBRID, MARCH, choose_engine
 
 # Largest fraction of a cycle by which round-off changes an integer number of cycles, so that a
 # record of 30 periods has 30 cycles.
@@ -110,8 +109,6 @@ def choose_numerics(model: Model) -> Numerics:
         steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / drive.cycles)))
     numerics = Numerics(engine.name, steps, drive.cycles, window, accuracy.shear_modes)
 
-    if engine is LINEAR:
-        return replace(numerics, steps=linear.N_STEPS)
     if engine is HYBRID:
         # A rig without friction needs few steps. Otherwise the error per step is a small part of the tolerance.
         is_exact = accuracy.method == "exact" or model.friction is None
