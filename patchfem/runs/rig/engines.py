@@ -26,9 +26,10 @@ from ...response.measures import Values
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ..patch import faces
-from .costs import prefers_time_steps
 from .solution import first_interface_load
 
+# Keys of [accuracy] that select constant time steps.
+MARCH_ACCURACY_KEYS = ("steps_per_cycle", "tail", "merge", "shear_modes")
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
 COMPARISON_MERGE_WIDTH_FACTOR = 0.5
 # Largest ratio of the neglected tail of a sum over bonds to the tolerance at which no run with a
@@ -309,16 +310,23 @@ def choose_engine(model: Model) -> Engine:
     """Choose the engine that computes the motion of a model.
 
     The method of the scene selects its engine. For method = "auto" the motion is computed from event to event if
-    possible, else in time steps. All engines solve the same equations, so the choice affects the time and the errors of a
-    run, but not its meaning; the summary of a run names its engine.
+    possible, else in time steps, and also if the scene has a setting of the time steps and a law that is not rigid. All
+    engines solve the same equations, so the choice affects the time and the errors of a run, but not its meaning; the
+    summary of a run names its engine.
     """
     for engine in ENGINES.values():
         if engine.method == model.accuracy.method:
             return engine
     if HYBRID.find_unsupported_feature(model):
         return MARCH
-    is_only_engine = model.grooves is not None
-    return HYBRID if is_only_engine or not prefers_time_steps(model) else MARCH
+    is_rigid = not model.partial_slip and all(
+        law_has_trait(law.numbers.law, "set-valued") and not law.partial_slip
+        for law in model.rig.friction.interfaces
+    )
+    accuracy = model.accuracy
+    has_setting = accuracy.quadrature not in ("auto", "recursion")
+    has_setting |= any(getattr(accuracy, key) is not None for key in MARCH_ACCURACY_KEYS)
+    return MARCH if has_setting and not is_rigid and model.grooves is None else HYBRID
 
 
 def describe_unused_settings(model: Model, engine: str) -> list[str]:
