@@ -5,7 +5,7 @@ Read the package in this order. A module imports only from its own entry of the 
 1. `lazy_imports` modules that are loaded on first use
 2. `exceptions`   errors with messages for the user and exit codes
 3. `formatting`   numbers as text: readable units, digits that match the error
-4. `cost_model`   CPU times per unit of work
+4. `cost_model`   CPU time without that of compiling
 5. `core`         exchanged records: interface, compliance, contact state, modal basis, response, measure, outcome
 6. `convergence`    error of a value from its changes between successive runs
 7. `motion_measures`  measures that several engines have: loops, energy balance, reversals

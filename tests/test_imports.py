@@ -43,20 +43,20 @@ PHYSICS = set(
     "time_steps wear".split()
 )
 PIECES = "contact elasticity mesh "  # folders needed to solve a static patch
-MOTION = "compiled hybrid response structure "  # folders needed to integrate the motion of a rig
+MOTION = "compiled friction hybrid response structure "  # folders needed to integrate the motion of a rig
 BENCH_FOLDERS = "friction response "  # folders needed to follow a prescribed slide
 WEAR = '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
 FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run` loads for the run and its page
     "static patch": (PATCH, PIECES),
     "bench of a point": (BENCH, BENCH_FOLDERS),
     "bench of a patch": (COATED + COULOMB + TRIANGLE, PIECES + BENCH_FOLDERS),
-    "linear rig": (STRUCTURE, "response structure"),
-    "rig of a point": (COULOMB_RIG, MOTION + "friction"),
-    "rig of elements": (PLASTIC_RIG, MOTION + "friction"),
-    "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + MOTION + "friction"),
+    "linear rig": (STRUCTURE, MOTION),
+    "rig of a point": (COULOMB_RIG, MOTION),
+    "rig of elements": (PLASTIC_RIG, MOTION),
+    "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + MOTION),
     "rig of a patch with slip": (
         COATED + SHEAR + PLASTIC + STRUCTURE,
-        PIECES + MOTION + "friction slip",
+        PIECES + MOTION + "slip",
     ),
     "wear": (COATED + COULOMB + TRIANGLE + WEAR, PIECES + BENCH_FOLDERS + "time_steps wear"),
 }

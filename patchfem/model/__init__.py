@@ -23,7 +23,6 @@ PUBLIC = {
         "build_without_sweep",
         "write_resolved",
     ),
-    "patch": ("TYPICAL_N_NODES",),
     "peaks": ("read_spectral_moments",),
     "pieces": (
         "extend_grid",

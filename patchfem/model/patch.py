@@ -21,7 +21,6 @@ MAX_STATIC_CELLS = 512
 MAX_SLIP_CELLS = 256
 MAX_POINT_CELLS = 64
 MAX_LIST_CELLS = 32
-TYPICAL_N_NODES = 160  # number of interface nodes that a patch takes at the default tolerance
 EQUAL_LENGTHS_TOL = 1e-9  # largest relative difference of equal lengths
 
 

@@ -55,7 +55,6 @@ class HistoryBytes(NamedTuple):
 
 # Memory of the histories by engine
 HISTORY_BYTES = {
-    "linear": HistoryBytes(80.0, 140.0, 0.0),
     "hybrid": HistoryBytes(80.0, 140.0, 16.0),
     "march": HistoryBytes(45.0, 50.0, 18.0),
 }

@@ -33,12 +33,6 @@ PUBLIC = {
         "find_accelerations",
         "make_response",
     ),
-    "linear_motion": (
-        "LinearRig",
-        "POINTS",
-        "WEIGHTS",
-        "interpolate",
-    ),
     "places": (
         "DIRECTION_NAMES",
         "note_missing_mass",

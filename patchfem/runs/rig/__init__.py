@@ -7,10 +7,9 @@ and then completes the result. `solve` solves the run and its coarse runs, each 
 record for each engine with its comparison runs. `scene.rules.methods.ENGINE_SUPPORT` lists what each engine can compute,
 and `runs.memory` the memory of its histories.
 
-Each engine has a module (`linear` for rigs without friction, `march`, `event_to_event` for the engine `hybrid`, and the
-folder `steady`), which prepares the integration in `structure.linear_motion`, `points` or `hybrid` and contains the
-measures that the engine computes itself. `evaluation` converts a run to a Solution, and `levels` continues a run from
-drive level to drive level. `joints` makes the laws and contact models of each engine from the friction of a patch.
-`numerics` has the numerical settings. `costs` has the predicted cost, on which the choice of an engine and a refusal
-are based. `bond_lists` has the length of a bond list, and the refusal of steps that are too long for it.
+Each engine has a module (`march`, `event_to_event` for the engine `hybrid`, and the folder `steady`), which prepares the
+integration in `time_steps` or `hybrid` and contains the measures that the engine computes itself. `evaluation` converts a
+run to a Solution, and `levels` continues a run from drive level to drive level. `joints` makes the laws and contact models
+of each engine from the friction of a patch. `numerics` has the numerical settings. `bond_lists` has the length of a bond
+list, and the refusal of steps that are too long for it.
 """

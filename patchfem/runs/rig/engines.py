@@ -13,12 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import friction, hybrid, slip
-from ...convergence import ERROR_SAFETY_FACTOR
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
 from ...response.coarser import CoarserRuns, ComparisonRuns, face_errors, second_order_errors
 from ...response.errors import (
-    absolute_change,
     convergence_errors,
     estimate_sampling_errors,
     finer_errors,
@@ -28,18 +26,15 @@ from ...response.measures import Values
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ..patch import faces
-from .costs import prefers_time_steps
 from .solution import first_interface_load
 
+# Keys of [accuracy] that select constant time steps.
+MARCH_ACCURACY_KEYS = ("steps_per_cycle", "tail", "merge", "shear_modes")
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
 COMPARISON_MERGE_WIDTH_FACTOR = 0.5
 # Largest ratio of the neglected tail of a sum over bonds to the tolerance at which no run with a
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
-LINEAR_METHOD = "exact"  # value of accuracy.method that a linear rig takes too
-LINEAR_ROUND_OFF = (
-    1e-11  # error of a sum or an extreme over all steps of a linear motion, relative to its value
-)
 # Ratio of the neglected tail in the comparison run to that in the run itself.
 COMPARISON_TAIL_FACTOR = 0.1
 
@@ -305,21 +300,6 @@ def _list_steady_space_runs(model: Model, numerics, patch, n_coarse, solution) -
     return [own, *_list_hybrid_space_runs(model, numerics, patch, n_coarse, solution)]
 
 
-def _list_linear_time_runs(model: Model, numerics) -> ComparisonRuns:
-    """List the run of a linear rig with half the steps of `numerics`, by comparison with which its errors are estimated."""
-    return [CoarserRuns((_divide_steps(numerics, 2),), _estimate_linear_errors)]
-
-
-def _estimate_linear_errors(values: Values, coarse_values: Values) -> Values:
-    """Return the errors of the measures of a linear rig from those of a run with half the steps: steps and round-off."""
-    errors = {}
-    for name, value in values.items():
-        change = absolute_change({name: value}, coarse_values).get(name, abs(value))
-        errors[name] = ERROR_SAFETY_FACTOR * change + LINEAR_ROUND_OFF * abs(value)
-    return errors
-
-
-LINEAR = Engine("linear", "", _list_linear_time_runs, lambda *inputs: [])
 HYBRID = Engine("hybrid", "exact", _list_hybrid_time_runs, _list_hybrid_space_runs)
 MARCH = Engine("march", "march", _list_march_time_runs, _list_march_space_runs, has_steps=True)
 HARMONIC = Engine(
@@ -329,7 +309,7 @@ HARMONIC = Engine(
     _list_steady_space_runs,
     finds_periodic_motion=True,
 )
-ENGINES = {engine.name: engine for engine in (LINEAR, HYBRID, MARCH, HARMONIC)}
+ENGINES = {engine.name: engine for engine in (HYBRID, MARCH, HARMONIC)}
 
 
 @lru_cache(8)
@@ -337,19 +317,23 @@ def choose_engine(model: Model) -> Engine:
     """Choose the engine that computes the motion of a model.
 
     The method of the scene selects its engine. For method = "auto" the motion is computed from event to event if
-    possible, else in time steps. All engines solve the same equations, so the choice affects the time and the errors of a
-    run, but not its meaning; the summary of a run names its engine.
+    possible, else in time steps, and also if the scene has a setting of the time steps and a law that is not rigid. All
+    engines solve the same equations, so the choice affects the time and the errors of a run, but not its meaning; the
+    summary of a run names its engine.
     """
-    is_free = model.accuracy.method in ("auto", LINEAR_METHOD)
-    if is_free and not LINEAR.find_unsupported_feature(model):
-        return LINEAR
     for engine in ENGINES.values():
         if engine.method == model.accuracy.method:
             return engine
     if HYBRID.find_unsupported_feature(model):
         return MARCH
-    is_only_engine = model.grooves is not None
-    return HYBRID if is_only_engine or not prefers_time_steps(model) else MARCH
+    is_rigid = not model.partial_slip and all(
+        law_has_trait(law.numbers.law, "set-valued") and not law.partial_slip
+        for law in model.rig.friction.interfaces
+    )
+    accuracy = model.accuracy
+    has_setting = accuracy.quadrature not in ("auto", "recursion")
+    has_setting |= any(getattr(accuracy, key) is not None for key in MARCH_ACCURACY_KEYS)
+    return MARCH if has_setting and not is_rigid and model.grooves is None else HYBRID
 
 
 def describe_unused_settings(model: Model, engine: str) -> list[str]:

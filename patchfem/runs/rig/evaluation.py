@@ -5,26 +5,23 @@ quantities that their engine computes more accurately than from samples.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ... import friction
-from ...convergence import convergence_error
 from ...core import Outcome, Response
 from ...cost_model import measure_cpu_time
 from ...effects import law_has_trait
 from ...response.decay_curve import measure_last_cycle_amplitude
-from ...response.errors import ERROR_MEASURES, absolute_change
 from ...response.events import Events, is_all_stuck
 from ...response.loops import reversal_force_rule
 from ...response.measures import Values, relative_gap
-from ...response.rows import AMPLITUDE, LastCycles, compute_measures, find_definition
+from ...response.rows import AMPLITUDE, LastCycles, compute_measures
 from ...structure.drive_sizes import is_sinusoidal
 from .levels import run_levels
-from .sample_times import LATE_SAMPLES_PER_CYCLE
-from .solution import Fields, Solution, first_interface_load, first_mode_stiffness
+from .solution import Solution, first_interface_load, first_mode_stiffness
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,8 +57,9 @@ class EngineRun:
 class RunEvaluator:
     """Evaluation of the runs of a model that one engine has computed.
 
-    The base class computes all measures from samples of the histories. The subclass of an engine integrates the motion
-    (`integrate`), and returns more accurate values of its engine by `describe_cycles`.
+    The subclass of an engine integrates the motion under a drive from the end of another run (`integrate`). It returns the
+    fields of `LastCycles` that it computes more accurately than from samples (`describe_cycles`), further fields of the
+    Solution (`collect_solution_fields`), and the errors that the run itself shows (`estimate_run_errors`).
 
     Parameters
     ----------
@@ -84,24 +82,6 @@ class RunEvaluator:
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.stick_tolerance = 0.0 if self.creeps else stick_tolerance
 
-    def integrate(self, drive, cycles: float, before, frames: int = 0, progress=None):
-        """Integrate the motion under a drive, and return the run of the engine; each engine overrides this method.
-
-        Parameters
-        ----------
-        drive
-            Acceleration of the base, or force over the modal mass.
-        cycles : float
-            Number of cycles of the drive.
-        before
-            Run from whose end the motion goes on, or None for the start of the rig.
-        frames : int
-            Number of snapshots of the interface in the last cycle.
-        progress : callable, optional
-            Callback for the completed fraction.
-        """
-        raise NotImplementedError
-
     def solve(self, frames: int, progress, prepare: Values) -> Solution:
         """Compute the motion of the rig, for one drive level after another, and its Solution.
 
@@ -122,20 +102,6 @@ class RunEvaluator:
         else:
             run = self.integrate(drive.signal, self.numerics.cycles, None, frames, progress)
         return self.make_solution(run, measure_cpu_time() - begin, prepare=prepare, **fields)
-
-    def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
-        """Return fields of `LastCycles` that the engine computes more accurately than from samples.
-
-        Parameters
-        ----------
-        run
-            Run of the engine, with all cycles or with those of a drive level.
-        drive
-            Drive of the run.
-        stuck : bool
-            Whether the interface is stuck during the last cycles.
-        """
-        return {}
 
     def evaluate_measures(self, run, drive=None, ledger=None, *, stuck: bool = False) -> Values:
         """Compute the measures of a run from its last cycles.
@@ -189,38 +155,6 @@ class RunEvaluator:
         if not self.has_friction or self.creeps:
             return False
         return is_all_stuck(run.window, self.stick_tolerance)
-
-    def estimate_run_errors(self, run, drive, values: Values) -> Values:
-        """Estimate the sampling errors of the measures of a random motion; {} for other drives.
-
-        They follow from the changes when every second sample of the window is removed, except for the last one.
-
-        Parameters
-        ----------
-        run
-            Run of the engine, with LATE_SAMPLES_PER_CYCLE samples in the cycles of its window.
-        drive
-            Drive of the run.
-        values : dict of float
-            Measures by name.
-        """
-        if not hasattr(drive, "band"):
-            return {}
-        count = run.window.time.size
-        samples = np.append(np.arange(0, count - 1, 2), count - 1)
-        thinned = replace(run, window=run.window.select(samples))
-        coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
-        errors = {}
-        for name, change in absolute_change(values, coarse_values).items():
-            if change > 0 and name not in ERROR_MEASURES:
-                row = find_definition(name)
-                error = convergence_error(change, order=row.order)
-                errors[name] = error + row.sample_error / LATE_SAMPLES_PER_CYCLE
-        return errors
-
-    def collect_solution_fields(self, run, drive) -> Fields:
-        """Return keyword arguments of `Solution` that only this engine provides; the base class has none."""
-        return {}
 
     def make_solution(self, run, seconds: float, drive=None, **other_fields) -> Solution:
         """Evaluate a run and return its Solution.

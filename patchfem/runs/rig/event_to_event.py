@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import compiled
+from ...convergence import convergence_error
 from ...core import NotConverged, Outcome, Response
 from ...hybrid import cases
 from ...hybrid import runs as engine
@@ -18,6 +19,7 @@ from ...hybrid.laws import is_rigid
 from ...hybrid.laws.masing import has_stick
 from ...hybrid.measures import compute_energies
 from ...hybrid.records import Margin, Memory, State, Status
+from ...response.errors import ERROR_MEASURES, absolute_change
 from ...response.events import (
     SEGMENT_BORDER,
     Events,
@@ -25,18 +27,14 @@ from ...response.events import (
     find_segment_borders,
     sort_events,
 )
+from ...response.measures import Values
 from ...response.ringing import compute_stuck_vibration, select_strongest
-from ...response.rows import select_names
-from ...structure.drive_sizes import is_sinusoidal
+from ...response.rows import find_definition, select_names
+from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
 from . import bands, engines
 from .evaluation import EngineRun, RunEvaluator, compute_sampled_work, compute_work_check
 from .joints import Joints, make_joints
-from .sample_times import (
-    SampleTimes,
-    choose_sample_times,
-    remove_incomplete_cycle,
-)
 from .solution import (
     Fields,
     Solution,
@@ -46,6 +44,11 @@ from .solution import (
     first_mode_stiffness,
 )
 
+LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
+MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
+N_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
+EARLY_SAMPLES_PER_CYCLE = 40  # largest number of these in a cycle by default
+MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 SAME_SAMPLE_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
 # Groups of measures that are computed in the same way where bands of a face slide apart: those of the motion, of the whole
 # run and of the errors of the solution. The others follow from the averages over the bands.
@@ -55,6 +58,19 @@ EARLY_OUTCOME_BY_STATUS = {
     Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
     Status.LEAVES_GROOVES: Outcome.LEAVES_GROOVES,
 }
+
+
+class SampleTimes(NamedTuple):
+    """Times of the samples of a run [s].
+
+    - samples (k,): all of them.
+    - snapshots (f,): those at which the elements are stored, in the last cycle.
+    - window_start: start of the window.
+    """
+
+    samples: np.ndarray
+    snapshots: np.ndarray
+    window_start: float
 
 
 class ElementSnapshot(NamedTuple):
@@ -343,7 +359,9 @@ class LumpedEvaluator(RunEvaluator):
         if not is_sinusoidal(drive):
             values |= dict.fromkeys(select_names("sine"))
         window = run.window
-        if self.has_friction:
+        if not self.has_friction:
+            values |= dict.fromkeys(select_names("run"))
+        else:
             if not first_mode_stiffness(self.model, run.window):
                 # The interface moves in several modes.
                 values["equivalent_damping"] = None
@@ -366,6 +384,34 @@ class LumpedEvaluator(RunEvaluator):
             # The other measures need samples of equal distances.
             "window": window.select(_find_even_samples(window)),
         }
+
+    def estimate_run_errors(self, run, drive, values: Values) -> Values:
+        """Estimate the sampling errors of the measures of a random motion; {} for other drives.
+
+        They follow from the changes when every second sample of the window is removed, except for the last one.
+
+        Parameters
+        ----------
+        run
+            Run of the engine, with LATE_SAMPLES_PER_CYCLE samples in the cycles of its window.
+        drive
+            Drive of the run.
+        values : dict of float
+            Measures by name.
+        """
+        if not hasattr(drive, "band"):
+            return {}
+        count = run.window.time.size
+        samples = np.append(np.arange(0, count - 1, 2), count - 1)
+        thinned = replace(run, window=run.window.select(samples))
+        coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
+        errors = {}
+        for name, change in absolute_change(values, coarse_values).items():
+            if change > 0 and name not in ERROR_MEASURES:
+                row = find_definition(name)
+                error = convergence_error(change, order=row.order)
+                errors[name] = error + row.sample_error / LATE_SAMPLES_PER_CYCLE
+        return errors
 
     def collect_solution_fields(self, run, drive) -> Fields:
         """Return the free vibration that remains after the last slip of a release, by the name of its field in `Solution`.
@@ -401,3 +447,57 @@ def _list_remembered_slides(state: State, interface: int) -> np.ndarray:
     memory = state.memory[interface]
     stack = memory[Memory.STACK :: 2][: int(memory[Memory.COUNT])]
     return memory[Memory.ORIGIN] + np.append(0.0, stack)
+
+
+def choose_sample_times(numerics, drive, cycles: float, frames: int = 0) -> SampleTimes:
+    """Choose the times of the samples and of `frames` snapshots.
+
+    Parameters
+    ----------
+    numerics : Numerics
+        Number of cycles of the window, and whether the histories before it are stored.
+    drive : drives.DriveSignal
+    cycles : float
+        Number of cycles of the drive in the run.
+    frames : int
+        Number of snapshots in the last cycle.
+    """
+    period = drive.period
+    end = cycles * period
+    window_start = max(0.0, end - numerics.window * period)
+    first = window_start
+    early = np.zeros(0)
+    if numerics.whole:
+        # Before the last cycles the distances are larger, and equal.
+        first = max(0.0, min(window_start, end - MIN_SAMPLED_CYCLES * period))
+        count = max(1, min(EARLY_SAMPLES_PER_CYCLE, N_EARLY_SAMPLES // max(cycles, 1)))
+        count = choose_samples_per_cycle(drive, cycles) or count
+        early = np.arange(0.0, first - 1e-9 * period, period / count)
+
+    # Each of the last cycles has LATE_SAMPLES_PER_CYCLE samples.
+    late = _divide(window_start, end, period, MIN_WINDOW_SAMPLES)
+    if first < window_start:
+        late = np.union1d(_divide(first, window_start, period, 2), late)
+
+    # A snapshot is taken at a sample, where all histories have a value.
+    begin = max(0.0, end - period)
+    at = begin + (end - begin) * (1 + np.arange(frames)) / max(frames, 1)
+    nearest = np.abs(late[:, None] - at).argmin(axis=0)
+    return SampleTimes(np.append(early, late), late[nearest], window_start)
+
+
+def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
+    """Return times (k,) [s] of equal distances from begin to end, LATE_SAMPLES_PER_CYCLE in a period.
+
+    The times and the period are in [s], and `minimum` is the smallest number of times.
+    """
+    count = round((end - begin) / period * LATE_SAMPLES_PER_CYCLE) + 1
+    return np.linspace(begin, end, max(minimum, count))
+
+
+def remove_incomplete_cycle(run):
+    """Remove the extremes and the complex amplitude of a last cycle that a run did not complete."""
+    count = int(run.cycles_done + 1e-9)
+    if not count:
+        return run
+    return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])

@@ -11,10 +11,8 @@ import numpy as np
 from ... import hybrid
 from ...effects import law_has_trait
 from ...model.model import Model
-from ...structure.drive_sizes import find_min_decay_rate, is_sinusoidal
-from . import linear
-from .costs import steps_per_cycle
-from .engines import HYBRID, LINEAR, MARCH, choose_engine
+from ...structure.drive_sizes import find_max_frequency_ratio, find_min_decay_rate, is_sinusoidal
+from .engines import HYBRID, MARCH, Engine, choose_engine
 
 # Largest fraction of a cycle by which round-off changes an integer number of cycles, so that a
 # record of 30 periods has 30 cycles.
@@ -23,6 +21,7 @@ WHOLE_CYCLE_TOL = 1e-6
 # e^-6.
 N_TRANSIENT_DECAY_TIMES = 3.0
 MIN_SAMPLES_PER_RUN = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
+MAX_MARCH_STEPS_PER_CYCLE = 6400  # Largest automatically chosen number of time steps per cycle.
 MIN_RELATIVE_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 
 
@@ -68,7 +67,29 @@ class Numerics:
         return replace(self, steps=2 * self.steps)
 
 
-def choose_numerics(model: Model) -> Numerics:
+def steps_per_cycle(model: Model) -> int:
+    """Return the steps per cycle of a time integration, from the scene or else from the tolerance.
+
+    The tolerance selects between 100 and MAX_MARCH_STEPS_PER_CYCLE steps.
+    """
+    if model.accuracy.steps_per_cycle:
+        return model.accuracy.steps_per_cycle
+    rig = model.rig
+    max_frequency_ratio = max(
+        find_max_frequency_ratio(rig.drive.signal),
+        float(rig.structure.frequencies.max()) * rig.drive.signal.period,
+    )
+    if model.load_varies:
+        max_frequency_ratio = max(
+            max_frequency_ratio, model.point.frequency * rig.drive.signal.period
+        )
+    # The error is proportional to the square of the step; 400 steps per cycle of the fastest motion
+    # give 1e-3.
+    steps = 2 * round(200 * sqrt(1e-3 / model.accuracy.tolerance) * max_frequency_ratio)
+    return min(max(steps, 100), MAX_MARCH_STEPS_PER_CYCLE)
+
+
+def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     """Choose the engine and the numerical settings of a run of a rig.
 
     The measures are evaluated over a window of the last cycles: a tenth of all cycles, at least 1 and at
@@ -79,6 +100,8 @@ def choose_numerics(model: Model) -> Numerics:
     ----------
     model : Model
         Its table [accuracy] sets what is not chosen here.
+    engine : Engine, optional
+        Engine of the run; default: that of `choose_engine`.
 
     Raises
     ------
@@ -89,7 +112,7 @@ def choose_numerics(model: Model) -> Numerics:
     rig = model.rig
     drive = rig.drive
     cycles = drive.cycles
-    engine = choose_engine(model)
+    engine = engine or choose_engine(model)
     window = int(max(1, min(10, (cycles + WHOLE_CYCLE_TOL) // 10)))
     # Under a random drive, the window is the whole record without its initial transient.
     if drive.waveform.is_random:
@@ -110,8 +133,6 @@ def choose_numerics(model: Model) -> Numerics:
         steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / drive.cycles)))
     numerics = Numerics(engine.name, steps, drive.cycles, window, accuracy.shear_modes)
 
-    if engine is LINEAR:
-        return replace(numerics, steps=linear.N_STEPS)
     if engine is HYBRID:
         # A rig without friction needs few steps. Otherwise the error per step is a small part of the tolerance.
         is_exact = accuracy.method == "exact" or model.friction is None

@@ -15,7 +15,6 @@ from ...model.model import Model
 from ...response.measures import Values
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from . import bond_lists
-from .costs import find_interface_load
 from .numerics import choose_numerics
 
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as
@@ -114,6 +113,11 @@ def count_unknowns(model: Model) -> dict[str, int]:
     if model.partial_slip and is_changed:
         counts["shear_modes"] = numerics.shear_modes or slip.shear_modes.N_SHEAR_MODES
     return counts
+
+
+def find_interface_load(model: Model, interface) -> float:
+    """Return the normal load [N] on an interface (default: on the whole model)."""
+    return model.nominal_load if interface.load is None else interface.load
 
 
 def compute_dimensionless_groups(model: Model) -> Values:

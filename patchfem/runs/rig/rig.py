@@ -9,7 +9,7 @@ from math import ceil, floor, log, log2
 
 import numpy as np
 
-from ...core import Outcome, PatchfemError
+from ...core import NotConverged, Outcome, PatchfemError
 from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...response import reasons, stationary
 from ...response.coarser import CoarserRuns, ComparisonRuns, StepRun, list_step_runs
@@ -26,15 +26,20 @@ from ..results.result import MotionData, Result, RunInputs, Settings
 from ..results.travel import check_pieces_overlap
 from . import bond_lists, decays, event_to_event, flutter, levels
 from . import fields as interface_fields
-from .costs import MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS
-from .engines import ENGINES, list_runs_with_other_modes
+from .engines import ENGINES, HYBRID, MARCH, list_runs_with_other_modes
 from .motion_warnings import collect_remarks
-from .numerics import MIN_RELATIVE_STEP_ERROR, Numerics, choose_numerics
+from .numerics import (
+    MAX_MARCH_STEPS_PER_CYCLE,
+    MIN_RELATIVE_STEP_ERROR,
+    Numerics,
+    choose_numerics,
+)
 from .solution import Solution, compute_peak_frequency
 from .solve import Runner
 
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
+MAX_REFINED_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
 # Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
 MIN_MOTION_RELATIVE_ERROR = 1e-9
 # Largest number of steps times nodes of a run that is repeated with smaller steps for measures that are not main ones. It
@@ -119,7 +124,17 @@ def run_rig(inputs: RunInputs) -> Result:
     numerics = choose_numerics(model)
     if numerics.engine == "march":
         bond_lists.refuse_unresolved_bond_vibration(model, numerics)
-    run, shortage = run_refined(inputs, numerics)
+    try:
+        run, shortage = run_refined(inputs, numerics)
+    except NotConverged as error:
+        # A law or a mode may be too fast to be followed from event to event.
+        is_chosen = model.accuracy.method == "auto" and numerics.engine == HYBRID.name
+        if not is_chosen or MARCH.find_unsupported_feature(model):
+            raise
+        obstacle = str(error).partition(";")[0]
+        note = f"the motion was computed in time steps: from event to event {obstacle}"
+        inputs = replace(inputs, notes=[*inputs.notes, note])
+        run, shortage = run_refined(inputs, choose_numerics(model, MARCH))
 
     # The reasons of missing values depend on the outcome, so that they come after it.
     if run.solution.levels and run.has_friction:

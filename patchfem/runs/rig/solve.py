@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ...response.coarser import ComparisonRuns, SourceErrors, estimate_errors
 from ..results.result import N_INTERFACE_FRAMES, RunInputs
-from . import event_to_event, linear, march
+from . import event_to_event, march
 from .numerics import Numerics
 from .solution import Solution, replace_output_by_gauge
 from .steady import steady
@@ -31,9 +31,7 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
         Callbacks for a line of text and for the completed fraction.
     """
     # Only the module of this engine is loaded.
-    if numerics.engine == "linear":
-        run = linear.run_linear
-    elif numerics.engine == "hybrid":
+    if numerics.engine == "hybrid":
         run = event_to_event.run_from_event_to_event
     elif numerics.engine == "march":
         run = march.march_in_time

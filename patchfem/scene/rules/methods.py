@@ -99,7 +99,6 @@ VARYING_LAWS = ("coulomb", "tanh", "elastic-plastic")
 # Features that each engine of a rig supports; `runs.rig.engines` refers to these names. The rows "exact" and "piecewise"
 # are the maps of a period by which a steady motion is found.
 ENGINE_SUPPORT = {
-    "linear": EngineSupport("none", "no-law levels"),
     "hybrid": EngineSupport("events", "no-law yaw faces levels parts spring load grooves"),
     "exact": EngineSupport("exact", "no-law yaw faces"),
     "piecewise": EngineSupport("pieces", "parts faces"),

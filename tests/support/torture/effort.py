@@ -1,11 +1,11 @@
 """Rough computing time of a scene, by which expensive random scenes are left out."""
 
-from patchfem import cost_model
 from patchfem.runs import choose_numerics
 from patchfem.runs.rig.bond_lists import has_bond_list, is_stuck_by_printed_law
-from patchfem.runs.rig.costs import estimate_hybrid_seconds
 
 NODE_SECONDS = 4e-5  # CPU time [s] per elastic unknown of the finest mesh
+LIST_STRIP_STEP_SECONDS = 2e-6  # CPU time [s] per time step and strip of a list of bonds
+HYBRID_CYCLE_SECONDS = 1e-3  # CPU time [s] of a cycle from event to event
 STEP_SECONDS = 1.5e-6  # CPU time [s] of a time step of a point
 POINT_STEP_SECONDS = 2e-7  # additional CPU time [s] of a time step per node of the interface
 N_JUMPS = 40  # jumps of wear if the run chooses their number
@@ -23,7 +23,7 @@ def estimate_seconds(plan) -> float:
     n_points = max(unknowns.get("interface_points", 0), unknowns.get("bond_list_about", 0))
     motion = 0.0
     if plan.engine == "hybrid":
-        motion = estimate_hybrid_seconds(model)
+        motion = HYBRID_CYCLE_SECONDS * model.rig.drive.cycles
     elif plan.engine == "harmonic":
         motion = 2.0
     elif model.rig is not None:
@@ -33,7 +33,7 @@ def estimate_seconds(plan) -> float:
         if is_stuck_by_printed_law(model) and has_bond_list(model, numerics):
             # One strip per step, in the list of each node.
             strips = max(n_points, 1) * numerics.cycles * numerics.steps
-            motion *= 1 + cost_model.LIST_STRIP_STEP_SECONDS * strips / 2 / step
+            motion *= 1 + LIST_STRIP_STEP_SECONDS * strips / 2 / step
     if model.wear is not None:
         seconds += (model.wear.jumps or N_JUMPS) * (JUMP_SECONDS + motion)
     return seconds + motion
