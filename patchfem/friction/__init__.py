@@ -12,9 +12,7 @@ PUBLIC = {
     "bonds.engines": (
         "RECURSION",
         "RequestedEngine",
-        "UNMERGED_WIDTH",
         "choose_engine",
-        "estimate_strip_error",
     ),
     "bonds.list_numbers": ("make_lists", "make_no_lists"),
     "bonds.parameters": (

@@ -9,13 +9,17 @@ solve
 
 with the path means and the forces f0, f1 at both ends of the laws (`laws_kernels`), the stiffness kappa of the coordinates
 and w = |d|/(|ds| + |d|). The pieces are in equilibrium at the end of a step, so that a law of the path alone is exact at the
-samples of a monotone stroke, whatever the step. F dq is the work of the laws plus the change of the elastic energy.
+samples of a monotone stroke, whatever the step. F dq is the work of the laws plus the change of the elastic energy. The
+force of a list of bonds jumps as bonds change their sign, so that there may be no equilibrium at the end of a step. Lists
+balance by their path means, F = sum of means and kappa (b + db/2) = shapes^T mean, where the derivatives of a potential
+vanish.
 
-Newton's method has the Jacobian in the space of ports and coordinates. A step that it does not solve is halved. Loads that
-follow from the motion (normal contact under heave and pitch, flanks of grooves, pressure of the lower piece) are iterated
-with it. Where a step does not resolve the decay of the velocity of a port by the viscosity V of its points, x = G V > 1, the
-weight 1 - 1/x goes to the end of the step, in the force and in the increment of the points. A vibration on stiff points that
-the step does not resolve stays undamped, so that comparisons with fewer steps show its error.
+Newton's method has the Jacobian in the space of ports and coordinates. With lists, a line search finds the minimum. A step
+that it does not solve is halved. Loads that follow from the motion (normal contact under heave and pitch, flanks of grooves,
+pressure of the lower piece) are iterated with it. Where a step does not resolve the decay of the velocity of a port by the
+viscosity V of its points, x = G V > 1, the weight 1 - 1/x goes to the end of the step, in the force and in the increment of
+the points. A vibration on stiff points that the step does not resolve stays undamped, so that comparisons with fewer steps
+show its error.
 
 A rigid point (`Law.COULOMB`), the only one on its port, slips under a given force, or its port is held at rest. A step in
 which a slipping port would reverse, or a port at rest is released, is halved up to the last level. The constant force of a
@@ -60,7 +64,12 @@ MAX_NEWTON_ITERATIONS = 60  # Newton iterations of a step
 MAX_LOAD_ITERATIONS = (
     30  # trials of the normal force on a flank, whose change falls by mu times the slope in each
 )
-MAX_CUTS = 8  # trials of a line search, each with a third of the step before
+MAX_CUTS = 8  # trials of a line search
+CUT = 0.3  # factor of a step by a trial of the line search
+MIN_CUT = 0.1  # the smallest one for lists
+MAX_OVERSHOOT = (
+    0.5  # slope beyond the minimum of a potential, relative to that at the start of a line search
+)
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
 # Largest residual of such a step relative to RESIDUAL, and that of lists, because sums over bonds jump by up to 1e-8
 STALLED = 1e3
@@ -170,7 +179,15 @@ def weigh_block(points, block, damping, step):
         return
 
     # Behind pieces it is the path mean over the part that slides, and the mean of both ends over the part of the pieces.
+    # Lists act on pieces by their path means, over both parts.
+    is_list = points.law[block] == Law.LIST
     for j in range(n_lanes):
+        if is_list:
+            values[Value.FORCE + j] = values[Value.MEAN + j]
+            values[Value.BY_SLIDE + j] = values[Value.MEAN_BY_SLIDE + j]
+            values[Value.BY_SHEAR + j] = -values[Value.MEAN_BY_SLIDE + j]
+            values[Value.BY_VELOCITY + j] = 0.0
+            continue
         slide = values[Value.SLIDE + j]
         bent = values[Value.BENT + j]
         path = abs(slide) + abs(bent) + TINY
@@ -337,16 +354,27 @@ def write_residual(system, level):
             vector[p] -= ports.redundant[p] * moves[Port.FORCE, p]
     largest = find_port_residual(system, level, size)
 
-    # kappa (b + db) = shapes^T f1
+    # kappa (b + db) = shapes^T f1, for lists kappa (b + db/2) = shapes^T mean
     shear = points.shear
     for p in range(n_ports):
+        weight = find_shear_weight(points, p)
+        row = Value.END if weight == 1.0 else Value.MEAN
         for k in range(points.first_shear[p], points.first_shear[p + 1]):
-            residual = points.stiffness[k] * (shear[Shear.VALUE, k] + shear[Shear.TRIAL, k])
+            residual = shear[Shear.VALUE, k] + weight * shear[Shear.TRIAL, k]
+            residual *= points.stiffness[k]
             for block in range(points.first[p], points.first[p + 1]):
-                residual -= sum_shape(points, k, block, Value.END)
+                residual -= sum_shape(points, k, block, row)
             vector[n_ports + k] = residual
             largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / (RESIDUAL * size))
     return largest
+
+
+@njit(**NJIT_CALL)
+def find_shear_weight(points, p):
+    """Return the part of a step at whose end the pieces of port p are in equilibrium: 1, or 1/2 for lists."""
+    block = points.first[p]
+    has_lists = block < points.first[p + 1] and points.law[block] == Law.LIST
+    return 0.5 if has_lists else 1.0
 
 
 @njit(**NJIT_CALL)
@@ -464,10 +492,12 @@ def write_products(points, p, matrix, n_ports, step):
     """
     start = points.first_shear[p]
     stop = points.first_shear[p + 1]
+    weight = find_shear_weight(points, p)
+    by_slide_row = Value.END_BY_SLIDE if weight == 1.0 else Value.MEAN_BY_SLIDE
     for k in range(start, stop):
         points.products[k, 0] = 0.0
         points.products[k, 1] = 0.0
-        matrix[n_ports + k, n_ports + k] = points.stiffness[k]
+        matrix[n_ports + k, n_ports + k] = weight * points.stiffness[k]
     for block in range(points.first[p], points.first[p + 1]):
         values = points.values[block]
         at = WIDTH * block
@@ -477,7 +507,7 @@ def write_products(points, p, matrix, n_ports, step):
             by_slide = 0.0
             by_shear = 0.0
             for j in range(n_lanes):
-                slope = values[Value.END_BY_SLIDE + j]
+                slope = values[by_slide_row + j]
                 slope += step.rate * values[Value.END_BY_VELOCITY + j]
                 weighted = shape[at + j] * slope
                 values[Value.WEIGHTED + j] = weighted
@@ -540,7 +570,6 @@ def solve_forces(system, level, step):
     step : Step
         Duration and formula of the velocity.
     """
-    ports = system.ports
     change = write_balanced_forces(system, level, step)
     if change < 0:
         return False
@@ -553,14 +582,18 @@ def solve_forces(system, level, step):
         if residual <= 1.0 or (n_stalls >= MAX_STALLS and residual <= stalled):
             return True
         system.totals[Total.ITERATIONS] += 1
-        write_matrix(system, level, step)
-        for i in range(ports.vector.size):
-            ports.step[i] = ports.vector[i]
-        if not solve_linear(ports.matrix, ports.step, ports.vector.size):
+        if not find_newton_step(system, level, step):
             return False
+        descent = -find_slope(system, level)
+        if has_lists and descent < 0:
+            drop_negative_slopes(system)
+            if not find_newton_step(system, level, step):
+                return False
+            descent = -find_slope(system, level)
         store_base(system)
 
-        # The line search accepts a step that decreases the largest residual.
+        # The line search accepts a step that decreases the largest residual, and with lists one near the minimum of the
+        # potential, because forces of lists bend at many places.
         fraction = 1.0
         before = residual
         for _ in range(LIST_CUTS if has_lists else MAX_CUTS):
@@ -569,9 +602,17 @@ def solve_forces(system, level, step):
             if change < 0:
                 return False
             residual = max(write_residual(system, level), change / LOAD_RESIDUAL)
-            if residual < before or residual <= 1.0:
+            if residual <= 1.0:
                 break
-            fraction *= 0.3
+            if has_lists:
+                slope = find_slope(system, level)
+                if descent <= 0 or slope <= MAX_OVERSHOOT * descent:
+                    break
+                fraction *= max(MIN_CUT, descent / (slope + descent))
+            elif residual < before:
+                break
+            else:
+                fraction *= CUT
         n_stalls = n_stalls + 1 if residual >= 0.5 * smallest else 0
         smallest = min(smallest, residual)
 
@@ -580,6 +621,62 @@ def solve_forces(system, level, step):
             if fraction * find_largest_move(system, level) <= INCREMENT_ROUND_OFF:
                 return True
     return residual <= stalled
+
+
+@njit(**NJIT_CALL)
+def find_newton_step(system, level, step):
+    """Write Newton's step to `ports.step`; return whether the Jacobian is regular.
+
+    Parameters
+    ----------
+    system : march_rows_kernels.System
+        Arrays of the march, changed in place.
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    step : Step
+        Duration and formula of the velocity.
+    """
+    ports = system.ports
+    write_matrix(system, level, step)
+    for i in range(ports.vector.size):
+        ports.step[i] = ports.vector[i]
+    return solve_linear(ports.matrix, ports.step, ports.vector.size)
+
+
+@njit(**NJIT_CALL)
+def find_slope(system, level):
+    """Return the slope [J] along Newton's step of the potential whose minimum solves a step of lists.
+
+    Its derivatives are -C r by the port forces, with their residuals r, and the residuals of the shear coordinates.
+    """
+    ports = system.ports
+    compliance = ports.compliance[level]
+    n_ports = ports.values.shape[1]
+    slope = 0.0
+    for p in range(n_ports):
+        for k in range(n_ports):
+            slope += ports.vector[p] * compliance[0, p, k] * ports.step[k]
+    for k in range(n_ports, ports.vector.size):
+        slope -= ports.vector[k] * ports.step[k]
+    return slope
+
+
+@njit(**NJIT_CALL)
+def drop_negative_slopes(system):
+    """Set the slopes of lists whose force falls with the slide to 0, so that the potential falls along Newton's step."""
+    points = system.points
+    moves = system.ports.values
+    for p in range(moves.shape[1]):
+        moves[Port.BY_SLIDE, p] = 0.0
+        for block in range(points.first[p], points.first[p + 1]):
+            values = points.values[block]
+            for j in range(count_lanes(points, block)):
+                slope = max(values[Value.BY_SLIDE + j], 0.0)
+                values[Value.BY_SLIDE + j] = slope
+                if points.law[block] == Law.LIST:
+                    values[Value.MEAN_BY_SLIDE + j] = slope
+                    values[Value.BY_SHEAR + j] = -slope
+            moves[Port.BY_SLIDE, p] += sum_points(points, block, Value.BY_SLIDE)
 
 
 @njit(**NJIT_CALL)

@@ -346,9 +346,9 @@ class March:
         if self.system.options.has_lists:
             names = ("created", "dissipated", "strips")
             ledger |= dict(zip(names, map(float, self._sum_lists() - self.first_sums)))
-            # Width [bond lengths] to which strips were joined because a list was full; 0 if none was
-            widths = self.system.lists.states[:, ListState.WIDTH]
-            ledger["forced_width"] = float(widths.max(initial=0.0))
+            # Largest error of a join that made room in a full list, relative to the load
+            errors = self.system.lists.states[:, ListState.JOIN_ERROR]
+            ledger["join_error"] = float(errors.max(initial=0.0))
         return ledger
 
     def _sum_lists(self) -> np.ndarray:

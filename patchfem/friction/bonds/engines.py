@@ -9,17 +9,14 @@ from dataclasses import dataclass
 from math import inf, sqrt
 from typing import NamedTuple
 
-from .list_numbers import MAX_DAMAGE, STRIPS_PER_WIDTH, UNMERGED_WIDTH, cutoff_age
+from .list_numbers import JOIN_ERROR, MAX_STRIPS, cutoff_age, find_max_age
 from .parameters import Bonds
 
 ENGINES = ("direct", "truncated", "merged", "recursion")
-# Upper bounds of the error of strips, divided by the square of their width (measured by test_merge_bounds): in general, for
-# growing bonds, and for orders between 0 and 1, whose bonds change steeply as they form
-MERGE_ERROR = 0.05
-MERGE_ERROR_GROWING = 0.1
-MERGE_ERROR_STEEP = 0.3
-# Error at any width for an order below 0, due to bonds that form at a reversal
-NEGATIVE_ORDER_ERROR = 3e-3
+# Upper bound of the error of the force / errors of the joins (measured by test_merge_bounds): in general, and for bonds of
+# reading "report" that grow, whose mean forces are sums over parts of an increment
+FORCE_TO_JOIN_ERROR = 1.0
+FORCE_TO_JOIN_ERROR_GROWING = 6.0
 # Largest change of the force due to the cut-off, as a fraction of the friction limit
 MAX_TAIL = 1e-6
 MAX_MERGE_WIDTH = 0.04  # largest merge width in bond lengths
@@ -41,6 +38,10 @@ class EngineChoice:
     merge: float
     error: float
     strips: float
+
+    def find_error(self, join_error: float) -> float:
+        """Return the bound of the total error / friction limit after joins of at most `join_error` / load in full lists."""
+        return max(self.error, self.tail + FORCE_TO_JOIN_ERROR_GROWING * join_error)
 
     def reach(self, order: float) -> float:
         """Return the age [bond lengths] beyond which bonds are dropped, or inf if none are dropped."""
@@ -69,26 +70,6 @@ class RequestedEngine(NamedTuple):
     name: str = "auto"
     tail: float | None = None
     merge: float | None = None
-
-
-def find_error_factor(law: Bonds) -> float:
-    """Return the bound of the error of strips / (friction limit * width^2), with their width in bond lengths."""
-    if law.order < 1 and law.order != 0:
-        return MERGE_ERROR_STEEP
-    return MERGE_ERROR_GROWING if law.has_growth else MERGE_ERROR
-
-
-def estimate_strip_error(law: Bonds, width: float) -> float:
-    """Return a bound of the error of the sum over strips, relative to the friction limit.
-
-    Parameters
-    ----------
-    law : Bonds
-        Parameters of the bonds.
-    width : float
-        Largest width of a strip [bond lengths].
-    """
-    return find_error_factor(law) * width**2 + NEGATIVE_ORDER_ERROR * (law.order < 0)
 
 
 def choose_engine(
@@ -133,16 +114,17 @@ def choose_engine(
     # tolerance, and the cut-off 0.001.
     if tail is None:
         tail = min(1e-3 * tolerance, MAX_TAIL)
+    is_growing = law.has_growth and law.reading == "report"
+    factor = JOIN_ERROR * (FORCE_TO_JOIN_ERROR_GROWING if is_growing else FORCE_TO_JOIN_ERROR)
     if merge is None:
-        merge = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / find_error_factor(law)))
+        merge = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / factor))
     if engine == "auto":
         engine = "merged" if merge > 0 else "truncated"
     tail = 0.0 if engine == "direct" else tail
     merge = merge if engine == "merged" else 0.0
 
-    # Without merging every increment of a step adds a strip.
-    width = merge or UNMERGED_WIDTH
-    error = tail + estimate_strip_error(law, width)
-    reach = min(cutoff_age(law.order, tail) if tail > 0 else inf, MAX_DAMAGE)
-    strips = STRIPS_PER_WIDTH / merge if merge > 0 else reach * max(steps / stroke, 1 / width)
-    return EngineChoice(engine, tail, merge, error, strips)
+    # A stroke adds a strip, or one per step where bonds grow.
+    reach = min(cutoff_age(law.order, tail) if tail > 0 else inf, find_max_age(law.order))
+    strips = reach / stroke * (steps if law.has_growth else 1.0)
+    strips = min(strips, MAX_STRIPS) if merge else strips
+    return EngineChoice(engine, tail, merge, tail + factor * merge**2, strips)

@@ -4,21 +4,26 @@ from math import ceil, gamma
 
 import numpy as np
 
+from .decay_kernels import N_CELLS_PER_AGE, N_COEFFICIENTS
 from .parameters import Bonds, growth_numbers
-from .strip_rows_kernels import BondLists, ListLaw, ListState, Strip
+from .strip_kernels import MAX_NEW_STRIPS
+from .strip_rows_kernels import N_STRIP_ENTRIES, BondLists, ListLaw, ListState, Strip
 
-MAX_DAMAGE = 745.0  # damage from which exp(-damage) underflows to zero
-UNMERGED_WIDTH = 0.02  # largest width of a new strip where none are merged [bond lengths]
 # Half the stretch [bond lengths] over which the initial bonds are distributed, so that their force has no jump
 INITIAL_HALF_WIDTH = 1e-6
-# Path in bond lengths over which strips grow e-fold for orders up to 1, and what each order above adds to it
-AGE_PER_WIDTH = 3.0
-AGE_PER_ORDER = 2.0
-# Strips of a merged list: those of a long slide times its width, those of growing bonds, and those between reversals
-STRIPS_PER_WIDTH = 6.0
-N_OTHER_STRIPS = 192
-N_GROWTH_STRIPS = 17  # new strips of a step by growth
-N_UNMERGED_STRIPS = 20_000  # all strips of unmerged lists
+# Path in bond lengths over which the error of a join grows e-fold for orders up to 1, and what each order above adds to it
+JOIN_AGE = 3.0
+JOIN_AGE_PER_ORDER = 2.0
+JOIN_ERROR = 0.1  # error of a join of young strips relative to the load, per square of the merge width [bond lengths]
+EXACT_JOIN = 1e-13  # error of joins, relative to the load, that is round-off
+MAX_STRIPS = 1024  # strips of a list beyond which joins with larger errors make room
+N_UNMERGED_STRIPS = 20_000  # all strips of lists that join without an error only
+# Age from which bonds have no strength to round-off, for the order 0, and what each order adds
+MAX_AGE = 60.0
+MAX_AGE_PER_ORDER = 4.0
+MIN_QUOTIENT_AGE = (
+    0.5  # age from which the integral of the strength over its power of the age loses no digits
+)
 
 
 def cutoff_age(order: float, tail: float) -> float:
@@ -31,6 +36,30 @@ def cutoff_age(order: float, tail: float) -> float:
     return float(gammainccinv(order + 1, tail))
 
 
+def find_max_age(order: float) -> float:
+    """Return the age [bond lengths] from which bonds of an order have no strength to round-off."""
+    return MAX_AGE + MAX_AGE_PER_ORDER * order
+
+
+def tabulate_decay(order: float, start: float) -> np.ndarray:
+    """Return the table of `decay_kernels.find_decay` from an age [bond lengths] on.
+
+    It has its first age, followed by the coefficients of the polynomials, each in place from -1 to 1 along its cell. They
+    interpolate P(p + 1, x)/(x |x|^p), with P the regularised lower incomplete gamma function continued to x < 0, which is
+    Kummer's function M(p + 1, p + 2, -x)/Gamma(p + 2).
+    """
+    from scipy.special import gammainc, hyp1f1
+
+    n_cells = ceil((find_max_age(order) - start) * N_CELLS_PER_AGE)
+    places = np.polynomial.chebyshev.chebpts1(N_COEFFICIENTS)
+    x = start + (np.arange(n_cells)[:, None] + 0.5 * (places + 1)) / N_CELLS_PER_AGE
+    values = hyp1f1(order + 1, order + 2, -np.minimum(x, MIN_QUOTIENT_AGE)) / gamma(order + 2)
+    is_large = x > MIN_QUOTIENT_AGE
+    values[is_large] = gammainc(order + 1, x[is_large]) / x[is_large] ** (order + 1)
+    coefficients = np.linalg.solve(np.vander(places, increasing=True), values.T)
+    return np.append(start, coefficients.T.ravel())
+
+
 def make_lists(bonds: Bonds, reach: float, merge: float, loads) -> BondLists:
     """Return the lists of the initial bonds of points that have not moved.
 
@@ -41,37 +70,30 @@ def make_lists(bonds: Bonds, reach: float, merge: float, loads) -> BondLists:
     reach : float
         Age in bond lengths beyond which bonds are dropped.
     merge : float
-        Largest width of a joined strip of age 0 in bond lengths; 0 joins none before a list is full.
+        Width in bond lengths within which young strips are joined: their force then has an error of JOIN_ERROR times its
+        square, relative to the load; 0 joins what causes no error before a list is full.
     loads : (m,) array
         Normal loads of the points [N].
     """
-    width = merge or UNMERGED_WIDTH
-    age_per_width = AGE_PER_WIDTH + AGE_PER_ORDER * max(bonds.order - 1, 0.0)
-    n_new = ceil(age_per_width / width) + N_GROWTH_STRIPS
-    capacity = ceil(2 * age_per_width / width) + N_OTHER_STRIPS
-    if not merge:
-        capacity = N_UNMERGED_STRIPS // loads.size + N_OTHER_STRIPS
-
-    law = np.zeros(len(ListLaw))
+    is_stretch = bonds.reading == "stretch"
+    max_age = find_max_age(bonds.order)
+    law = np.zeros(ListLaw.TABLE)
     law[ListLaw.ORDER] = bonds.order
     law[ListLaw.LENGTH] = bonds.length
     law[ListLaw.INVERSE_GAMMA] = 1 / gamma(bonds.order + 1)
-    law[ListLaw.IS_STRETCH] = bonds.reading == "stretch"
-    law[ListLaw.CUTOFF] = min(reach, MAX_DAMAGE) * bonds.length
-    law[ListLaw.WIDTH] = width
-    law[ListLaw.AGE_PER_WIDTH] = age_per_width
-    law[ListLaw.MERGES] = merge > 0
-    law[ListLaw.MAX_NEW] = n_new
+    law[ListLaw.IS_STRETCH] = is_stretch
+    law[ListLaw.CUTOFF] = min(reach, max_age) * (1.0 if is_stretch else bonds.length)
+    law[ListLaw.JOIN_ERROR] = max(JOIN_ERROR * merge**2, EXACT_JOIN)
+    law[ListLaw.JOIN_AGE] = JOIN_AGE + JOIN_AGE_PER_ORDER * max(bonds.order - 1, 0.0)
+    law = np.append(law, tabulate_decay(bonds.order, -max_age if is_stretch else 0.0))
 
     # The initial bonds are a strip that formed at once, without stretch.
-    strips = np.zeros((loads.size, Strip.SECOND + 2, capacity + n_new))
-    weight = bonds.initial * law[ListLaw.INVERSE_GAMMA] * loads
-    if bonds.reading == "stretch":
-        weight = weight / bonds.length**bonds.order
-    strips[:, Strip.HALF_WIDTH] = INITIAL_HALF_WIDTH * bonds.length
-    strips[:, Strip.WEIGHT, 0] = weight
-    if bonds.reading == "stretch":
-        strips[:, Strip.STRENGTH, 0] = weight
+    capacity = MAX_STRIPS if merge else N_UNMERGED_STRIPS // loads.size + MAX_STRIPS
+    strips = np.zeros((loads.size, capacity + MAX_NEW_STRIPS, N_STRIP_ENTRIES))
+    half = INITIAL_HALF_WIDTH * bonds.length
+    unit = bonds.length**bonds.order if is_stretch else 1.0
+    for point, load in enumerate(loads):
+        strips[point, 0] = Strip(-half, half, 0.0, 0.0, 0.0, bonds.initial * load / unit, 0.0, 0.0)
     states = np.zeros((loads.size, len(ListState)))
     states[:, ListState.COUNT] = float(bonds.initial > 0)
     states[:, ListState.LENGTH] = bonds.length

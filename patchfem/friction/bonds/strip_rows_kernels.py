@@ -1,37 +1,50 @@
-"""Named rows of the arrays of a list of bonds (eq. 2.17)."""
+"""Records and arrays of a list of bonds (eq. 2.17)."""
 
 from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
+from ...compiled.flags_kernels import NJIT_KERNEL
+from ...compiled.jit import njit
 
-class Strip(IntEnum):
-    """Rows of the strips of a point. A strip has the bonds that formed on a piece of the path, from old to young.
 
-    - STRETCH, HALF_WIDTH: middle of the stretches of its bonds and half their range [m]; the half width is negative if the
-      bonds formed in a slide to -x
-    - AGE, HALF_AGE: path since the bonds in its middle formed, and half the path on which all formed [m]; the initial
-      bonds have the half age 0
-    - WEIGHT: force of the strip over mu_s at unit strength and unit stretch [N], or [N m^-p] for reading = "stretch"
-    - SHORT_1, SHORT_2: by how much the bonds at two Gauss points of the strip, the younger one first, are shorter than
-      mature bonds [m]; for reading = "stretch" their damage per path as they formed [1/m]
-    - STRENGTH: weight times the present strength of the bonds; the next row has the relative change of the strength from
-      the middle of the stretches to the largest one
-    - MIDDLE, FIRST, SECOND: the same at later instants of a trial step
+class Strip(NamedTuple):
+    """Bonds that formed on a piece of the path; stretch and age are linear from the first ones, the youngest, to the last.
+
+    - stretch_1, stretch_2: stretch of the first and of the last bonds [m]
+    - age_1, age_2: path since these bonds formed [m], or their damage [1] for reading = "stretch"
+    - range: largest difference of the ages of two bonds; 0 for the initial bonds, which formed at once
+    - weight: force of the strip over mu_s at unit strength and unit stretch [N], or [N m^-p] for reading = "stretch"
+    - short_1, short_2: by how much the bonds at two Gauss points of the strip, the younger one first, are shorter than
+      mature bonds [m]; 0 for reading = "stretch"
     """
 
-    STRETCH = 0
-    HALF_WIDTH = 1
-    AGE = 2
-    HALF_AGE = 3
-    WEIGHT = 4
-    SHORT_1 = 5
-    SHORT_2 = 6
-    STRENGTH = 7
-    MIDDLE = 9
-    FIRST = 11
-    SECOND = 13
+    stretch_1: float
+    stretch_2: float
+    age_1: float
+    age_2: float
+    range: float
+    weight: float
+    short_1: float
+    short_2: float
+
+
+N_STRIP_ENTRIES = len(Strip._fields)
+
+
+@njit(**NJIT_KERNEL)
+def read_strip(strips, k):
+    """Return the `Strip` of number k in the array `strips` (capacity, 8)."""
+    row = strips[k]
+    return Strip(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7])
+
+
+@njit(**NJIT_KERNEL)
+def write_strip(strips, k, strip):
+    """Write a `Strip` to the number k of the array `strips` (capacity, 8)."""
+    for i in range(N_STRIP_ENTRIES):
+        strips[k, i] = strip[i]
 
 
 class ListState(IntEnum):
@@ -42,7 +55,7 @@ class ListState(IntEnum):
     - LOAD: load under which bonds form [N]
     - FORCE, ENERGY: friction force [N] and stored energy [J], both over mu_s
     - CREATED, DISSIPATED: energies since the start [J]
-    - WIDTH: largest width of a joined strip of age 0 [bond lengths]; it grows if the list is full
+    - JOIN_ERROR: largest error of a join that made room in the full list, relative to the load
     """
 
     COUNT = 0
@@ -53,7 +66,7 @@ class ListState(IntEnum):
     ENERGY = 5
     CREATED = 6
     DISSIPATED = 7
-    WIDTH = 8
+    JOIN_ERROR = 8
 
 
 class ListLaw(IntEnum):
@@ -61,11 +74,10 @@ class ListLaw(IntEnum):
 
     - ORDER, LENGTH, INVERSE_GAMMA: exponent p, bond length eps_0 [m] and 1/Gamma(p + 1)
     - IS_STRETCH: 1 for reading = "stretch", 0 for "report"
-    - CUTOFF: age [m] beyond which bonds are dropped
-    - WIDTH: largest width of a new strip, and of a joined one of age 0 [bond lengths]
-    - AGE_PER_WIDTH: path in bond lengths over which this width grows e-fold, because older bonds carry less
-    - MERGES: 1 if strips are joined
-    - MAX_NEW: largest number of strips that form in a step
+    - CUTOFF: age beyond which bonds are dropped, in the unit of `Strip.age_1`
+    - JOIN_ERROR: error up to which strips of age 0 are joined, relative to the load
+    - JOIN_AGE: path in bond lengths over which this error grows e-fold, because older bonds carry less
+    - TABLE: first age of the table of `decay_kernels.find_decay`, whose coefficients follow
     """
 
     ORDER = 0
@@ -73,18 +85,17 @@ class ListLaw(IntEnum):
     INVERSE_GAMMA = 2
     IS_STRETCH = 3
     CUTOFF = 4
-    WIDTH = 5
-    AGE_PER_WIDTH = 6
-    MERGES = 7
-    MAX_NEW = 8
+    JOIN_ERROR = 5
+    JOIN_AGE = 6
+    TABLE = 7
 
 
 class BondLists(NamedTuple):
     """Lists of the bonds of m points.
 
-    - strips: (m, 15, capacity) rows of `Strip`; the columns after the last strip are workspace
-    - states: (m, 9) rows of `ListState`
-    - law: (9,) rows of `ListLaw`
+    - strips: (m, capacity, 8) entries of `Strip`
+    - states: (m, 9) entries of `ListState`
+    - law: (k,) entries of `ListLaw`, followed by the table
     - growth: (5,) parameters of eq. 2.10, see `point_rows_kernels.GrowthNumbers`
     """
 
@@ -97,7 +108,7 @@ class BondLists(NamedTuple):
 class BondList(NamedTuple):
     """List of the bonds of a point; the fields are those of `BondLists`.
 
-    - strips: (15, capacity)
+    - strips: (capacity, 8)
     - state: (9,)
     - law, growth: those of all points
     """

@@ -143,8 +143,7 @@ def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | N
     choice = choose_bond_summation(model, slide)
     if choice.engine != "merged":
         return choice
-    strip_error = bond_engines.estimate_strip_error(model.bonds, bond_engines.UNMERGED_WIDTH)
-    return replace(choice, engine="truncated", merge=0.0, error=choice.tail + strip_error)
+    return replace(choice, engine="truncated", merge=0.0, error=choice.tail)
 
 
 def mean_stroke(slide) -> tuple[float, float]:

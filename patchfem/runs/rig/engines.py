@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import friction, hybrid, slip
+from ... import hybrid, slip
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
 from ...response.coarser import CoarserRuns, ComparisonRuns, face_errors, second_order_errors
@@ -210,11 +210,7 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> ComparisonRun
         span = max(window.time[-1] - window.time[0], 1e-300)
         works = solution.book["passed"], passed * model.rig.drive.signal.period / span
 
-        # Strips of a full list are wider than those of the choice.
-        forced = friction.bonds.engines.estimate_strip_error(
-            model.bonds, solution.book["forced_width"]
-        )
-        error = max(choice.error, forced)
+        error = choice.find_error(solution.book["join_error"])
         return friction_errors(values, error, model.friction, load, works)
 
     # The change of the motion adds to the bound where strips or the tail are coarse.
