@@ -21,7 +21,6 @@ from ...response.coarser import (
     second_order_errors,
 )
 from ...response.errors import convergence_errors, finer_errors, friction_errors
-from ...response.measures import interpolate_peak
 from ..results.patch_rows import Values
 from . import bench
 from .engine import CONTACT_POINTS, uses_parallel_elements
@@ -94,7 +93,6 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
     bench_runs = {}
     errors = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
-    errors.append(("samples", _estimate_peak_errors(fine_run)))
     if find_bond_sum_error(fine_run.engine):
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
 
@@ -164,16 +162,6 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
         )
         out.append(CoarserRuns((narrow,), finer_errors, quarter, "bonds"))
     return out
-
-
-def _estimate_peak_errors(fine_run) -> Values:
-    """Return by how much smooth peaks exceed their samples, which runs with fewer steps share with a BenchRun."""
-    force = np.abs(fine_run.force)
-    loads = fine_run.load
-    ratio = np.divide(force, loads, out=np.zeros_like(force), where=loads > 0)
-    peaks = {"friction_force_peak": force, "friction_ratio_peak": ratio}
-    misses = {name: interpolate_peak(samples)[0] - samples.max() for name, samples in peaks.items()}
-    return dict.fromkeys(fine_run.values, 0.0) | misses
 
 
 def find_bond_sum_error(engine) -> float:
