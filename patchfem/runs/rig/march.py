@@ -22,7 +22,7 @@ from .contact_points import make_contact
 from .evaluation import RunEvaluator, compute_work_check
 from .solution import Fields, Solution, compute_sampled_loop, describe_escape, find_travel
 
-# Largest move in a step of an interface that sticks rigidly, relative to the range of its slide: round-off
+# Largest move in a step of an interface that sticks rigidly, relative to the sum of the slides of its modes: round-off
 MAX_HELD_MOVE = 1e-9
 
 
@@ -141,7 +141,8 @@ class MarchEvaluator(RunEvaluator):
             return {}
         peaks = {}
         for k, (point_set, slide) in enumerate(zip(self.contact.point_sets, window.slides.T)):
-            rests = np.abs(np.diff(slide)) <= MAX_HELD_MOVE * np.ptp(slide)
+            size = np.max(np.abs(window.modal) @ np.abs(point_set.row))
+            rests = np.abs(np.diff(slide)) <= MAX_HELD_MOVE * size
             if self.contact.is_rigid(point_set) and (rests[:-1] > rests[1:]).any():
                 number = f"_{k + 1}" if k else ""
                 peaks[f"friction_force_peak{number}"] = float(point_set.law.limits.sum())
