@@ -426,15 +426,11 @@ def instantiate(
     ValueError
         If the module does not import another one exactly once under one of these names.
     """
-    text = _find_source(module).read_text("utf-8")
-    for alias, replacement in replacements.items():
-        has_name = hasattr(replacement, "__name__")
-        name = replacement.__name__ if has_name else f"patchfem.{replacement}"
-        text, count = re.subn(
-            rf"(?m)^from \.[\w.]* import \w+ as {alias}$", f"import {name} as {alias}", text
-        )
-        if count != 1:
-            raise ValueError(f"patchfem.{module} imports its part {alias} {count} times, not once")
+    names = {
+        alias: getattr(replacement, "__name__", f"patchfem.{replacement}")
+        for alias, replacement in replacements.items()
+    }
+    text = _replace_imports(module, tuple(names.items()))
     imported = [other for other in replacements.values() if isinstance(other, KernelModule)]
 
     # Each new module would load its machine code (about 1 MB) again, in every run of a long sweep.
@@ -442,6 +438,22 @@ def instantiate(
     if name not in _KERNEL_MODULES:
         _KERNEL_MODULES[name] = write_kernel_module(name, text, report, imported)
     return _KERNEL_MODULES[name]
+
+
+@cache
+def _replace_imports(module: str, names: tuple[tuple[str, str], ...]) -> str:
+    """Return the source of a module that imports others under some names; each is a pair of name and module.
+
+    A bench and its error estimate ask for the same source ten times, and a search through it takes a millisecond.
+    """
+    text = _find_source(module).read_text("utf-8")
+    for alias, name in names:
+        text, count = re.subn(
+            rf"(?m)^from \.[\w.]* import \w+ as {alias}$", f"import {name} as {alias}", text
+        )
+        if count != 1:
+            raise ValueError(f"patchfem.{module} imports its part {alias} {count} times, not once")
+    return text
 
 
 def hash_text(text: str) -> str:

@@ -49,21 +49,20 @@ def move_cell(force, springs, softness, is_fixed, slide, start_load, end_load):
     start_load, end_load : float
         Loads at its ends [N].
     """
-    # The first half of the change of load cuts the force and adds springs.
+    # The first half of the change of load adds springs.
     middle = 0.5 * (start_load + end_load)
-    start = min(max(force, -middle), middle)
     raised = max(springs, middle) if middle > 0 else 0.0
     springs = springs if is_fixed > 0 else raised
 
-    # Path under the mean load
+    # Path under the mean load. A cell that unloads faster than the load falls is not cut; the cut is no slide.
     rate = springs * softness
     move = rate * slide
-    free = start + move
+    free = force + move
     stop = min(max(free, -middle), middle)
     can_move = abs(move) > MIN_MOVE
     inverse = 1 / move if can_move else 0.0
-    elastic = (stop - start) * inverse if can_move else 1.0
-    mean = stop + 0.5 * elastic * (start - stop)
+    elastic = min(max((stop - force) * inverse, 0.0), 1.0) if can_move else 1.0
+    mean = stop + 0.5 * elastic * (force - stop)
     mean_slope = 0.5 * rate * elastic * elastic
 
     # Second half: the limit falls, or the part of the slide that slipped stretches the spring up to the new limit.
@@ -77,7 +76,8 @@ def move_cell(force, springs, softness, is_fixed, slide, start_load, end_load):
     mean_slope += ((more if free == last else 0.0) - extra) * rate * inverse
 
     # Springs beyond the load break over the rest of the slide, by an exponential of order 2.
-    path = abs(free - stop - more) * (1 / rate if rate > 0 else 0.0) * softness
+    slipped = max((1 - elastic) * abs(move) - abs(more), 0.0)
+    path = slipped * (1 / rate if rate > 0 else 0.0) * softness
     left = middle + (springs - middle) / (1 + path * (1 + 0.5 * path))
     left = max(left, end_load) if end_load > 0 else 0.0
     springs = springs if is_fixed > 0 else left

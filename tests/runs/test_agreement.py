@@ -121,6 +121,10 @@ PAIRS = {
         TIGHT, "accuracy.method=exact", "accuracy.method=march", "", "hybrid march", 1e-4,
     ),
     "two interfaces": (PAIR + FORCED, TIGHT, "accuracy.method=exact", "accuracy.method=march", "", "hybrid march", 3e-6),
+    "release beyond slip": (
+        POINT + COULOMB + STRUCTURE, TIGHT + "normal.load=60 N; friction.kinetic=0.2; drive.cycles=12",
+        "accuracy.method=exact", "accuracy.method=march", "friction_force_peak loop_area", "hybrid march", 1e-7,
+    ),
     "bonds": (SOFT_BONDS, "", "", "accuracy.steps_per_cycle=1600", "", "hybrid march", 2e-4),
     "growing bonds": (SOFT_BONDS, GROWING, "", "accuracy.steps_per_cycle=1600", "", "hybrid march", 1e-5),
     "vanishing acceleration": (
@@ -145,10 +149,13 @@ PAIRS = {
         UNEQUAL, "", "accuracy.method=exact", "accuracy.method=march; accuracy.steps_per_cycle=800",
         "slip_amplitude stick_fraction stick_fraction_2 loop_area loop_area_2", "hybrid march", 1e-3,
     ),
+    # Leaving out 5 % of the bonds changes this motion by 1.4 times its size (1.51 times its loop area, 1.48 by lists with
+    # other strips); the bound only says that the cut is felt.
     "truncated bonds": (
         BOND_SUM, "friction.order=0.5; accuracy.steps_per_cycle=120", "accuracy.quadrature=truncated; accuracy.tail=0.05",
         "accuracy.quadrature=truncated; accuracy.tail=1e-9", MAIN, "march march", 1.6,
     ),
+    # Strips of .3 bond lengths change the force by up to 1e-4 (stated: 1 %) and take a tenth of the time of single strips.
     "merged bonds": (
         BOND_SUM, "friction.reading=report; friction.initial_bonds=0; accuracy.steps_per_cycle=120; " + GROWING,
         "accuracy.merge=0.3", "accuracy.quadrature=truncated; accuracy.tail=1e-9", MAIN, "march march", 3e-4,

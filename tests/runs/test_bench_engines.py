@@ -1,6 +1,7 @@
 """Engines of a bench agree with references in NumPy, and their errors, energy balance and progress
 are right."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from friction_paths import reference_bond_lengths
 from patchfem import build
 from patchfem.friction import steady_loop
 from patchfem.runs.bench import bench
+from patchfem.runs.bench.errors import estimate_bench_errors
 from patchfem.runs.bench.slides import find_rest_ends
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -187,3 +189,18 @@ def test_exact_iwan_loop_agrees_with_closed_form(chi, beta, amplitude):
         assert difference <= 1e-9 * abs(exact), name
         # A smooth peak between two samples is part of the error of a peak.
         assert 0 < measures[name].error < 1e-7 * abs(exact), name
+
+
+def test_exact_full_list_of_bonds_widens_errors():
+    """Strips that a full list joins to .5 bond lengths dominate the error of the sum over bonds."""
+    model = build(
+        '[normal]\nload = "10 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\norder = 2\n'
+        '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\ncycles = 1\n'
+    )
+    fine = bench.run_bench(model, None, 40)
+    full = replace(fine, forced_width=0.5)
+    free, forced = (
+        dict(estimate_bench_errors(model, [None], one, 40).errors)["bonds"]["loop_area"]
+        for one in (fine, full)
+    )
+    assert fine.forced_width == 0 and forced > 10 * free

@@ -13,7 +13,7 @@ def test_exact_errors_of_levels_include_mesh_error():
 
     The errors were 1e-9 of the values in an earlier version.
     """
-    # Without further passes, which depend on the speed of the machine.
+    # Without further passes: each that fits into the time is made, and within 1 s their number depends on the machine.
     text = (
         "[accuracy]\nmax_seconds = 0.001\n"
         '[contact]\nlength = "40 mm"\nwidth = "30 mm"\nheight = "10 mm"\nload = "6 kN"\nsubstrate = "steel"\n'

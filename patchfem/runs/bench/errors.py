@@ -12,6 +12,7 @@ import numpy as np
 
 from ... import slip
 from ...effects import law_has_trait
+from ...friction.bonds import engines as bond_engines
 from ...response.coarser import (
     CoarserRuns,
     StepRun,
@@ -21,7 +22,6 @@ from ...response.coarser import (
     second_order_errors,
 )
 from ...response.errors import convergence_errors, finer_errors, friction_errors
-from ...response.measures import interpolate_peak
 from ..results.patch_rows import Values
 from . import bench
 from .engine import CONTACT_POINTS, uses_parallel_elements
@@ -94,8 +94,7 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
     bench_runs = {}
     errors = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
-    errors.append(("samples", _estimate_peak_errors(fine_run)))
-    if find_bond_sum_error(fine_run.engine):
+    if _find_bond_sum_error(model, fine_run):
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
 
     # The history of step numbers serves the accuracy curve of the report.
@@ -166,19 +165,14 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
     return out
 
 
-def _estimate_peak_errors(fine_run) -> Values:
-    """Return by how much smooth peaks exceed their samples, which runs with fewer steps share with a BenchRun."""
-    force = np.abs(fine_run.force)
-    loads = fine_run.load
-    ratio = np.divide(force, loads, out=np.zeros_like(force), where=loads > 0)
-    peaks = {"friction_force_peak": force, "friction_ratio_peak": ratio}
-    misses = {name: interpolate_peak(samples)[0] - samples.max() for name, samples in peaks.items()}
-    return dict.fromkeys(fine_run.values, 0.0) | misses
-
-
-def find_bond_sum_error(engine) -> float:
-    """Return the error of bond summation relative to the friction limit; 0 without bonds."""
-    return 0.0 if engine.choice is None else engine.choice.error
+def _find_bond_sum_error(model, fine_run) -> float:
+    """Return the error of the bond summation of a BenchRun relative to the friction limit; 0 without bonds."""
+    choice = fine_run.engine.choice
+    if choice is None:
+        return 0.0
+    # Strips of a full list are wider than those of the choice.
+    forced = bond_engines.estimate_strip_error(model.bonds, fine_run.forced_width)
+    return max(choice.error, forced)
 
 
 def _estimate_bond_sum_errors(model, fine_run) -> Values:
@@ -186,7 +180,7 @@ def _estimate_bond_sum_errors(model, fine_run) -> Values:
     work = np.abs(np.diff(fine_run.ledger[0]))
     return friction_errors(
         fine_run.values,
-        find_bond_sum_error(fine_run.engine),
+        _find_bond_sum_error(model, fine_run),
         model.friction,
         float(fine_run.load.max()),
         (float(work.sum()), float(work[fine_run.first :].sum())),

@@ -42,6 +42,7 @@ class SlideHistories(NamedTuple):
     - ledger (4, k): cumulative work, stored energy, cumulative dissipated and created energy [J].
     - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
     - shear_modes: number of shear modes of the pieces; None without modes.
+    - forced_width: width [bond lengths] to which strips of bonds were joined because a list was full; 0 if none was.
     """
 
     force: np.ndarray
@@ -51,6 +52,7 @@ class SlideHistories(NamedTuple):
     tau: np.ndarray
     local: np.ndarray
     shear_modes: int | None = None
+    forced_width: float = 0.0
 
 
 class SlideTask(NamedTuple):
@@ -410,7 +412,9 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     ledger = stack_energies(work, motion.stored, motion.losses)
     shape = contact.point_sets[0].shear
     count = None if shape is None else shape.stiffness.size
-    return SlideHistories(motion.force, load, local_slip, ledger, tau, local, count)
+    return SlideHistories(
+        motion.force, load, local_slip, ledger, tau, local, count, motion.forced_width
+    )
 
 
 def _is_timeless(model) -> bool:

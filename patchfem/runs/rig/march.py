@@ -22,6 +22,9 @@ from .contact_points import make_contact
 from .evaluation import RunEvaluator, compute_work_check
 from .solution import Fields, Solution, compute_sampled_loop, describe_escape, find_travel
 
+# Largest move in a step of an interface that sticks rigidly, relative to the sum of the slides of its modes: round-off
+MAX_HELD_MOVE = 1e-9
+
 
 def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Integrate the motion of a rig in time steps and evaluate its measures, without errors from coarse runs.
@@ -125,7 +128,25 @@ class MarchEvaluator(RunEvaluator):
         values : dict of float
             Measures by name.
         """
-        return peak_sampling_errors(run.window)
+        return peak_sampling_errors(run.window) | dict.fromkeys(
+            self._find_release_forces(run.window), 0.0
+        )
+
+    def _find_release_forces(self, window) -> Values:
+        """Return the static friction limits [N] of rigid interfaces that stick and slip in a window, by name of their peak.
+
+        The friction force reaches the limit at the instant of the release, between two samples.
+        """
+        if self.contact.has_loads or self.model.rig.friction.bands_slide_apart:
+            return {}
+        peaks = {}
+        for k, (point_set, slide) in enumerate(zip(self.contact.point_sets, window.slides.T)):
+            size = np.max(np.abs(window.modal) @ np.abs(point_set.row))
+            rests = np.abs(np.diff(slide)) <= MAX_HELD_MOVE * size
+            if self.contact.is_rigid(point_set) and (rests[:-1] > rests[1:]).any():
+                number = f"_{k + 1}" if k else ""
+                peaks[f"friction_force_peak{number}"] = float(point_set.law.limits.sum())
+        return peaks
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return the check of the friction work, the friction loop, the energies, and the measures of a stuck interface.
@@ -151,6 +172,7 @@ class MarchEvaluator(RunEvaluator):
             energies = energies | {"power": energies["power"] + moving}
             missing = {"slip_start_phase": None, "stick_fraction": 1.0}
         values = {"work_check": compute_work_check(energies)} | missing
+        values |= self._find_release_forces(run.window)
         return {
             "integrated": values,
             "run_energies": energies,
@@ -171,11 +193,9 @@ class MarchEvaluator(RunEvaluator):
         """
         window = run.window
         work = run.window_work
-        # `window_work` is that of all interfaces and of impacts at stops; that of the first interface is int F dx. The
-        # friction of bands that yaw does more work than follows from their mean displacement.
-        friction = self.model.rig.friction
-        is_rigid_block = self.contact.set_valued and not friction.bands_slide_apart
-        if len(friction.names) > 1 or is_rigid_block:
+        # `window_work` is that of all interfaces, whose stops and releases within a step it contains; that of the first of
+        # several ones is int F dx. Bands that yaw do more work than follows from their mean displacement.
+        if len(self.model.rig.friction.names) > 1:
             work = float(run.step_force @ np.diff(window.slide))
 
         span = window.time[-1] - window.time[0]
