@@ -16,7 +16,7 @@ PUBLIC = {
         "choose_engine",
         "estimate_strip_error",
     ),
-    "bonds.list_numbers": ("make_lists", "make_no_lists"),
+    "bonds.list_numbers": ("join_lists", "make_lists", "make_no_lists"),
     "bonds.parameters": (
         "Bonds",
         "MAX_LIST_SECONDS",

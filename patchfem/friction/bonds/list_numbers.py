@@ -76,10 +76,21 @@ def make_lists(bonds: Bonds, reach: float, merge: float, loads) -> BondLists:
     states[:, ListState.COUNT] = float(bonds.initial > 0)
     states[:, ListState.LENGTH] = bonds.length
     states[:, ListState.LOAD] = loads
-    return BondLists(strips, states, law, growth_numbers(bonds))
+    rows = np.tile(law, (loads.size, 1)), np.tile(growth_numbers(bonds), (loads.size, 1))
+    return BondLists(strips, states, *rows)
+
+
+def join_lists(parts) -> BondLists:
+    """Return the lists of several groups of points as those of one group, each with the room of the longest."""
+    room = max(part.strips.shape[2] for part in parts)
+    wide = [
+        np.pad(part.strips, ((0, 0), (0, 0), (0, room - part.strips.shape[2]))) for part in parts
+    ]
+    _, *rows = zip(*parts)
+    return BondLists(np.concatenate(wide), *(np.concatenate(row) for row in rows))
 
 
 def make_no_lists(count: int) -> BondLists:
     """Return the empty lists of `count` points whose law needs none."""
-    empty = np.zeros(0)
+    empty = np.zeros((count, 0))
     return BondLists(np.zeros((count, 0, 0)), np.zeros((count, len(ListState))), empty, empty)

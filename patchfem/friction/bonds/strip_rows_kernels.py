@@ -84,8 +84,8 @@ class BondLists(NamedTuple):
 
     - strips: (m, 15, capacity) rows of `Strip`; the columns after the last strip are workspace
     - states: (m, 9) rows of `ListState`
-    - law: (9,) rows of `ListLaw`
-    - growth: (5,) parameters of eq. 2.10, see `point_rows_kernels.GrowthNumbers`
+    - law: (m, 9) rows of `ListLaw`
+    - growth: (m, 5) parameters of eq. 2.10, see `point_rows_kernels.GrowthNumbers`
     """
 
     strips: np.ndarray
@@ -99,7 +99,8 @@ class BondList(NamedTuple):
 
     - strips: (15, capacity)
     - state: (9,)
-    - law, growth: those of all points
+    - law: (9,)
+    - growth: (5,)
     """
 
     strips: np.ndarray
