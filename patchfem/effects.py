@@ -8,7 +8,6 @@ supported features and its traits, as words separated by blanks. Every law can b
 interface under a constant load. Optional features are:
 
 - `shear`: elastic pieces ([contact.shear]);
-- `joints`: several interfaces, stiffening springs and bands that yaw;
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
 - `harmonic`: steady motions over one period;
@@ -206,21 +205,21 @@ EFFECTS = {
         "laws.coulomb",
         "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
         ("", "kinetic"),
-        "shear joints exact pieces march",
+        "shear exact pieces march",
         "set-valued timeless memoryless",
     ),
     "friction.law=tanh": _make_law(
         "laws.tanh",
         "F = mu N tanh(v/v_0) (2.4)",
         ("reference_speed", ""),
-        "joints harmonic march",
+        "harmonic march",
         "memoryless creeps",
     ),
     "friction.law=elastic-plastic": _make_law(
         "laws.elastic_plastic",
         "F' = k v, |F| <= mu N (3.12, corrected for reversals), k = stiffness or mu N/bond_length",
         ("bond_length|stiffness", ""),
-        "shear joints harmonic pieces march",
+        "shear harmonic pieces march",
         "timeless",
     ),
     "friction.law=nonlocal": _make_law(
@@ -231,28 +230,28 @@ EFFECTS = {
             "kinetic reading order rest_growth slip_growth rest_speed "
             "initial_bonds spread temperature",
         ),
-        "shear joints harmonic march",
+        "shear harmonic march",
         "bonds",
     ),
     "friction.law=convolution": _make_law(
         "laws.convolution",
         "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds (Oden, Pires)",
         ("bond_length", "order spread"),
-        "joints exact march",
+        "exact march",
         "averaged set-valued timeless memoryless",
     ),
     "friction.law=iwan": _make_law(
         "laws.iwan",
         "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max) (Segalman)",
         ("stiffness chi beta", ""),
-        "joints harmonic pieces march",
+        "harmonic pieces march",
         "timeless cells",
     ),
     "friction.law=bouc-wen": _make_law(
         "laws.bouc_wen",
         "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
         ("stiffness", "exponent shape"),
-        "joints harmonic march",
+        "harmonic march",
         "timeless",
     ),
     "friction.law=lugre": _make_law(
@@ -260,7 +259,7 @@ EFFECTS = {
         "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "
         "(mu_s - mu_k) N exp(-(v/v_s)^2) (Canudas de Wit; Dahl: mu_k = mu_s, no damping)",
         ("stiffness stribeck_speed", "kinetic micro_damping viscous"),
-        "joints harmonic march",
+        "harmonic march",
     ),
     "friction.reading=stretch": Effect(
         "patchfem.friction.bonds.point_kernels", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"

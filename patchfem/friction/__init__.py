@@ -14,7 +14,7 @@ PUBLIC = {
         "RequestedEngine",
         "choose_engine",
     ),
-    "bonds.list_numbers": ("make_lists", "make_no_lists"),
+    "bonds.list_numbers": ("join_lists", "make_lists", "make_no_lists"),
     "bonds.parameters": (
         "Bonds",
         "MAX_LIST_SECONDS",

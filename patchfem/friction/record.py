@@ -41,8 +41,6 @@ def stick_stiffness(friction, load: float) -> float:
         return 0.0
     if law_has_trait(friction.law, "bonds"):
         return friction.static * load / friction.bond_length
-    if law_has_trait(friction.law, "averaged"):
-        return inf
     law = make_law(friction, load)
     return law.static * load / law.length if law.length else inf
 

@@ -184,7 +184,7 @@ def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
     table = scene.structure.interface[number]
     return InterfaceLaw(
         key=f"structure.interface.{number}",
-        numbers=make_effective_law(table, None, table.normal_load),
+        numbers=make_effective_law(table, table.contact and table.contact.width, table.normal_load),
         load=table.normal_load,
         patch=_build_interface_patch(scene, number),
     )
@@ -203,7 +203,8 @@ def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
     except PatchfemError as error:
         error.key = error.key and f"structure.interface.{number}.{error.key}"
         raise
-    return replace(patch, interface=replace(patch.interface, partial_slip=table.compliance_key))
+    partial_slip = table.compliance_key if table.static else ""
+    return replace(patch, interface=replace(patch.interface, partial_slip=partial_slip))
 
 
 def find_normal_load(scene: Scene) -> float | None:

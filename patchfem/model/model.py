@@ -253,6 +253,10 @@ def _build(scene: Scene) -> Model:
     # The mesh of a patch is finer where contact edges move, or where partial slip must be resolved
     law = _build_law(scene, rig_model)
     if patch_model is not None:
+        if law.friction is not None and law.friction.static == 0:
+            # Without friction no shear stress deforms the pieces.
+            still = replace(patch_model.interface, partial_slip="")
+            patch_model = replace(patch_model, interface=still)
         edge_motion = _find_edge_motion(scene, rig_model)
         is_fine = rig_model is None and scene.wear is None
         patch_model = patch_model.with_mesh(edge_motion=edge_motion, is_fine=is_fine)
@@ -390,7 +394,11 @@ def _build_law(scene: Scene, rig_model: Rig | None) -> _SceneLaw:
     law = interfaces[0] if interfaces else scene.friction
     if law is None:
         return _SceneLaw()
-    pad = find_pad_width(scene)
+    pad = (
+        interfaces[0].contact and interfaces[0].contact.width
+        if interfaces
+        else find_pad_width(scene)
+    )
     if rig_model is not None:
         friction = rig_model.friction.interfaces[0].numbers
     else:

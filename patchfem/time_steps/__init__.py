@@ -31,7 +31,7 @@ change of ENERGY.
 # Names that other folders use, by module
 PUBLIC = {
     "checkpoint": ("CheckpointFiles", "store_checkpoints"),
-    "contacts": ("BondSum", "Contact", "PointSet"),
+    "contacts": ("BondSum", "Contact", "LowerPressure", "PointSet"),
     "laws": (
         "STIFF_LAWS",
         "PointLaw",

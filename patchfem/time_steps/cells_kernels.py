@@ -33,7 +33,7 @@ class MovedCell(NamedTuple):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def move_cell(force, springs, softness, is_fixed, slide, start_load, end_load):
+def move_cell(force, springs, softness, is_fixed, slide, loads):
     """Return a `MovedCell` after a step; it has no branch, so that loops over cells are vectorised.
 
     Parameters
@@ -46,11 +46,13 @@ def move_cell(force, springs, softness, is_fixed, slide, start_load, end_load):
         1 if the springs do not follow the load, else 0.
     slide : float
         Slide of the step [m].
-    start_load, end_load : float
-        Loads at its ends [N].
+    loads : tuple of float
+        Loads at its ends [N], then those that limit a slide to -x.
     """
+    start_load, end_load, start_back, end_back = loads
     # The first half of the change of load adds springs.
     middle = 0.5 * (start_load + end_load)
+    back = 0.5 * (start_back + end_back)
     raised = max(springs, middle) if middle > 0 else 0.0
     springs = springs if is_fixed > 0 else raised
 
@@ -58,7 +60,7 @@ def move_cell(force, springs, softness, is_fixed, slide, start_load, end_load):
     rate = springs * softness
     move = rate * slide
     free = force + move
-    stop = min(max(free, -middle), middle)
+    stop = min(max(free, -back), middle)
     can_move = abs(move) > MIN_MOVE
     inverse = 1 / move if can_move else 0.0
     elastic = min(max((stop - force) * inverse, 0.0), 1.0) if can_move else 1.0
@@ -66,10 +68,10 @@ def move_cell(force, springs, softness, is_fixed, slide, start_load, end_load):
     mean_slope = 0.5 * rate * elastic * elastic
 
     # Second half: the limit falls, or the part of the slide that slipped stretches the spring up to the new limit.
-    last = min(max(free, -end_load), end_load)
+    last = min(max(free, -end_back), end_load)
     follows = can_move and abs(last) > abs(stop)
     more = last - stop if follows else 0.0
-    last = last if follows else min(max(stop, -end_load), end_load)
+    last = last if follows else min(max(stop, -end_back), end_load)
     end_slope = rate if free == last else 0.0
     extra = 0.5 * more * more * inverse
     mean += extra
@@ -98,8 +100,12 @@ def slide_cells(numbers, memory, trial, values, count, step):
             1 / numbers[CellRow.LENGTH + j],
             numbers[CellRow.IS_FIXED + j],
             values[Value.SLIDE + j],
-            values[Value.START_LOAD + j],
-            values[Value.END_LOAD + j],
+            (
+                values[Value.START_LOAD + j],
+                values[Value.END_LOAD + j],
+                values[Value.START_BACK + j],
+                values[Value.END_BACK + j],
+            ),
         )
         trial[j] = cell.force
         trial[WIDTH + j] = cell.springs
@@ -142,8 +148,7 @@ def slide_sliders(numbers, memory, trial, values, count, step):
                 numbers[softness + k],
                 0.0,
                 slide,
-                start_load,
-                end_load,
+                (start_load, end_load, start_load, end_load),
             )
             trial[forces + k] = cell.force
             trial[springs + k] = cell.springs

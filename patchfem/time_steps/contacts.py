@@ -27,17 +27,32 @@ class BondSum(NamedTuple):
     merge: float
 
 
+class LowerPressure(NamedTuple):
+    """Pressure of the lower piece, over which the points of a set slide.
+
+    - places (m,): positions of the points [m]
+    - shares (m,): load [N] of a point at the relative pressure 1
+    - tables: positions [m] and relative pressures (2, k) for slides to +x, and others for slides to -x if the law
+      averages the pressure
+    """
+
+    places: np.ndarray
+    shares: np.ndarray
+    tables: tuple[np.ndarray, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class PointSet:
     """Contact points that act on one port, that is, on one displacement of the rig such as the slide of an interface.
 
     - law: laws of the m points under their loads at the start
     - row (n,): displacement of the port per modal coordinate
-    - nodes (m,): node whose normal force is the load of a point, RESULTANT or LOWER
+    - nodes (m,): node whose normal force is the load of a point; None for a share of the resultant. Nodes (2, m) of
+      slides to +x and -x number the averages behind the nodes, in both directions, and then their sums
     - shear: slip.shear_modes.ShearModes of pieces that deform, or None
     - is_spring: whether the point is a spring
-    - shares (m,): load [N] of a point at the relative pressure 1 of the lower piece, with LOWER
-    - places (m,): positions of the points [m], with LOWER
+    - lower: pressure of the lower piece, if it gives the loads, or None
+    - bond_sum: sum over the bonds of points with lists, or None
     """
 
     law: PointLaw
@@ -45,8 +60,8 @@ class PointSet:
     nodes: np.ndarray | None = None
     shear: object = None
     is_spring: bool = False
-    shares: np.ndarray | None = None
-    places: np.ndarray | None = None
+    lower: LowerPressure | None = None
+    bond_sum: BondSum | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,10 +75,9 @@ class Contact:
     - heave, pitch (n,): motions of the holder per modal coordinate, with `sets`
     - load: function of times (k,) [s] that returns a prescribed load [N]
     - preload: load at the start [N], with `sets`, `load` or `grooves`
-    - bond_sum: sum over the bonds of points with lists
-    - pressure (2, k): positions [m] and relative pressures of the lower piece
     - grooves: grooves whose flanks the first interface climbs
     - elements: slip.shear_modes.JenkinsSet whose elements are the points, or None
+    - averages (2, m, m - 1, 2): weights of the nodal forces of `sets` in averages for slides to +x and -x, or None
     """
 
     point_sets: list[PointSet]
@@ -74,14 +88,18 @@ class Contact:
     pitch: np.ndarray | None = None
     load: object = None
     preload: float = 1.0
-    bond_sum: BondSum | None = None
-    pressure: np.ndarray | None = None
     grooves: Grooves | None = None
     elements: object = None
+    averages: np.ndarray | None = None
 
     def is_rigid(self, point_set: PointSet) -> bool:
         """Return whether a set of points sticks without displacement."""
         return point_set.law.law == Law.COULOMB
+
+    @property
+    def has_lists(self) -> bool:
+        """Whether the bonds of some points are summed over lists."""
+        return any(point_set.bond_sum is not None for point_set in self.point_sets)
 
     @property
     def set_valued(self) -> bool:
@@ -96,5 +114,6 @@ class Contact:
     @property
     def has_loads(self) -> bool:
         """Whether the load of a point changes, by the motion, with time, or as it slides."""
-        parts = (self.sets, self.load, self.pressure, self.grooves)
+        parts = [self.sets, self.load, self.grooves]
+        parts += [point_set.lower for point_set in self.point_sets]
         return any(part is not None for part in parts)

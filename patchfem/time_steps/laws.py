@@ -19,13 +19,14 @@ class Blocks(NamedTuple):
     """Arrays of b blocks of points.
 
     - numbers (b, k WIDTH), memory (b, l WIDTH): rows of the law
-    - load (b, WIDTH): normal load [N]
+    - load, back (b, WIDTH): normal load [N], and the load that limits a slide to -x
     - count (b,): number of points
     """
 
     numbers: np.ndarray
     memory: np.ndarray
     load: np.ndarray
+    back: np.ndarray
     count: np.ndarray
 
 
@@ -48,6 +49,7 @@ class PointLaw(NamedTuple):
     - load (m,): normal load [N] at the start
     - stiffness, viscosity (m,): of a point at rest [N/m], [N s/m]
     - sliders: cells of all points, of the law SLIDERS
+    - back (m,): load that limits a slide to -x [N], of a law that averages the pressure; None for `load`
     """
 
     law: Law
@@ -57,6 +59,7 @@ class PointLaw(NamedTuple):
     stiffness: np.ndarray
     viscosity: np.ndarray
     sliders: Sliders | None = None
+    back: np.ndarray | None = None
 
     def make_blocks(self) -> "Blocks":
         """Return the arrays of the blocks of these points; the places behind the last point have no load."""
@@ -74,13 +77,15 @@ class PointLaw(NamedTuple):
         memory = reshape(self.memory, "constant")
         memory[:, :WIDTH] = reshape(self.memory[:1], "edge")
         load = reshape(self.load[None], "constant")
+        back = load if self.back is None else reshape(self.back[None], "constant")
         if self.sliders is not None:
             size = self.sliders.weights.size
             cells = np.concatenate([np.full(WIDTH, float(size)), *self.sliders])
             numbers = np.hstack([numbers, np.tile(cells, (n_blocks, 1))])
             springs = np.repeat(load[:, :, None], size, axis=2)
             memory = np.concatenate([np.zeros_like(springs), springs], axis=2).reshape(n_blocks, -1)
-        return Blocks(numbers, memory, load, np.minimum(count - WIDTH * np.arange(n_blocks), WIDTH))
+        counts = np.minimum(count - WIDTH * np.arange(n_blocks), WIDTH)
+        return Blocks(numbers, memory, load, back, counts)
 
     @property
     def limits(self) -> np.ndarray:
@@ -283,6 +288,7 @@ def _make_elastic_plastic(law, load, compliance=0.0) -> PointLaw:
 # Function (law, load) that returns the points of a law, by `friction.law`
 MAKERS = {
     "coulomb": make_coulomb,
+    "convolution": make_coulomb,
     "elastic-plastic": _make_elastic_plastic,
     "iwan": make_iwan,
     "nonlocal": make_bonds,
@@ -291,7 +297,7 @@ MAKERS = {
     "tanh": make_tanh,
 }
 # Laws that are stiff or rigid, so that points need the compliance of the shear modes left out
-STIFF_LAWS = ("coulomb", "tanh")
+STIFF_LAWS = ("coulomb", "convolution", "tanh")
 
 
 def make_point_law(name: str, law, load, compliance=0.0) -> PointLaw:

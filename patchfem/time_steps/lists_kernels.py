@@ -33,7 +33,7 @@ def slide_lists(lists, numbers, values, count, step):
         k = int(numbers[ListRow.INDEX + j])
         middle = 0.5 * (values[Value.START_LOAD + j] + values[Value.END_LOAD + j])
         lists.states[k, ListState.LOAD] = middle
-        bonds = BondList(lists.strips[k], lists.states[k], lists.law, lists.growth)
+        bonds = BondList(lists.strips[k], lists.states[k], lists.law[k], lists.growth[k])
         velocity = values[Value.START_VELOCITY + j]
         force = slide_list(bonds, values[Value.SLIDE + j], velocity, step.duration)
         friction = numbers[ListRow.FRICTION + j]
@@ -68,7 +68,7 @@ def advance_lists(lists, numbers, values, count, duration):
         before = state[ListState.ENERGY]
         slide = values[Value.SLIDE + j]
         start = values[Value.START_VELOCITY + j]
-        bonds = BondList(lists.strips[k], state, lists.law, lists.growth)
+        bonds = BondList(lists.strips[k], state, lists.law[k], lists.growth[k])
         advance_list(bonds, slide, start, values[Value.VELOCITY + j], duration)
         load = values[Value.END_LOAD + j]
         if load <= 0.0:
@@ -80,5 +80,5 @@ def advance_lists(lists, numbers, values, count, duration):
         state[ListState.DISSIPATED] += max(loss, 0.0)
         values[Value.END + j] = friction * state[ListState.FORCE]
         values[Value.ENERGY + j] = friction * state[ListState.ENERGY]
-        stretch = state[ListState.FORCE] * lists.law[ListLaw.LENGTH]
+        stretch = state[ListState.FORCE] * lists.law[k, ListLaw.LENGTH]
         values[Value.STRETCH + j] = stretch / load if load > 0 else 0.0

@@ -54,6 +54,7 @@ from .motion_kernels import (
     find_port_residual,
     find_resultant,
     move_ports,
+    pick_load,
     solve_linear,
     store_base,
     subtract_step,
@@ -323,7 +324,11 @@ def slip_rigidly(system, p, block):
     values = points.values[block]
     if system.structure.path.size:
         points.trial[block, 0] = np.sign(system.ports.values[Port.INCREMENT, p])
-    load = 0.5 * (values[Value.START_LOAD] + values[Value.END_LOAD])
+    direction = points.trial[block, 0]
+    load = 0.5 * (
+        pick_load(values, Value.START_LOAD, direction)
+        + pick_load(values, Value.END_LOAD, direction)
+    )
     values[Value.FORCE] = points.trial[block, 0] * points.numbers[block, WIDTH] * load
     return values[Value.FORCE]
 
@@ -723,6 +728,7 @@ def find_loads(system, row, fraction, is_solved):
 
     change = 0.0
     total = TINY_LOAD
+    has_back = points.node.shape[1] > WIDTH
     for block in range(points.law.size):
         if points.is_spring[points.port[block]]:
             continue
@@ -732,6 +738,10 @@ def find_loads(system, row, fraction, is_solved):
             load = find_point_load(points, (block, j), x, resultant)
             change = max(change, abs(load - values[Value.END_LOAD + j]))
             values[Value.END_LOAD + j] = load
+            if has_back:
+                x += points.place[block, WIDTH + j] - points.place[block, j]
+                load = find_point_load(points, (block, WIDTH + j), x, resultant)
+            values[Value.END_BACK + j] = load
             total += load
     is_prescribed = system.structure.loads.size and ports.contact[0] < 0
     return 0.0 if is_prescribed else change / total
@@ -831,8 +841,9 @@ def release_port(system, drive, is_shortest):
         if ports.values[Port.HELD, p] == 0:
             continue
         block = points.first[p]
-        limit = points.numbers[block, 0] * points.values[block, Value.END_LOAD]
-        hold = abs(ports.values[Port.HOLD, p])
+        hold = ports.values[Port.HOLD, p]
+        limit = points.numbers[block, 0] * pick_load(points.values[block], Value.END_LOAD, hold)
+        hold = abs(hold)
         if hold > largest * limit:
             worst = p
             largest = hold / limit if limit > 0 else np.inf
@@ -862,8 +873,8 @@ def commit(system, duration):
             moves[Port.RETURN, p] = moves[Port.INCREMENT, p] if was_held else 0.0
             values[Value.SLIDE] = moves[Port.INCREMENT, p] - moves[Port.RETURN, p]
             rest += moves[Port.FORCE, p] * moves[Port.RETURN, p]
-            limit = points.numbers[block, WIDTH] * values[Value.END_LOAD]
-            values[Value.END] = limit * points.trial[block, 0]
+            load = pick_load(values, Value.END_LOAD, points.trial[block, 0])
+            values[Value.END] = points.numbers[block, WIDTH] * load * points.trial[block, 0]
         elif points.law[block] == Law.LIST:
             numbers = points.numbers[block]
             lists.advance_lists(system.lists, numbers, values, points.count[block], duration)
@@ -871,6 +882,7 @@ def commit(system, duration):
         for j in range(n_lanes):
             values[Value.TOTAL + j] += values[Value.SLIDE + j]
             values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
+            values[Value.START_BACK + j] = values[Value.END_BACK + j]
             values[Value.START_VELOCITY + j] = values[Value.VELOCITY + j]
             values[Value.START + j] = values[Value.END + j]
             values[Value.LAST_SLIDE + j] = values[Value.SLIDE + j]
@@ -1011,8 +1023,8 @@ def press_at_rest(system):
         for j in range(points.count[block]):
             values[Value.SLIDE + j] = 0.0
         if points.law[block] == Law.COULOMB:
-            limit = points.numbers[block, WIDTH] * values[Value.END_LOAD]
-            values[Value.END] = limit * points.memory[block, 0]
+            load = pick_load(values, Value.END_LOAD, points.memory[block, 0])
+            values[Value.END] = points.numbers[block, WIDTH] * load * points.memory[block, 0]
         elif points.law[block] != Law.LIST:
             slide_points(
                 points.law[block],
@@ -1028,6 +1040,7 @@ def press_at_rest(system):
 
         for j in range(points.count[block]):
             values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
+            values[Value.START_BACK + j] = values[Value.END_BACK + j]
             values[Value.START + j] = values[Value.END + j]
 
 

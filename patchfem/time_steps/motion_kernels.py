@@ -9,6 +9,7 @@ from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
 from . import flanks_kernels as flanks
 from .march_rows_kernels import LOWER, RESIDUAL, Flank, Port, Shear, Total
+from .step_rows_kernels import Value
 
 INCREMENT_ROUND_OFF = 4e-16  # round-off error of an increment relative to its size
 # Weight of the residuals of normal contact, which loses no energy, so that they would add up over the steps
@@ -297,7 +298,7 @@ def advance_shear(points, dt):
 
 @njit(**NJIT_CALL)
 def find_resultant(system, row, fraction, is_solved):
-    """Return the load [N] at the end of a step that follows from a flank or from a prescribed history; 0 without one.
+    """Return the load [N] at the end of a step that follows from a flank or from a prescribed history; 1 without one.
 
     Parameters
     ----------
@@ -318,7 +319,7 @@ def find_resultant(system, row, fraction, is_solved):
             q = moves[Port.SLIDE, 0] + moves[Port.INCREMENT, 0]
             flank[Flank.NORMAL] = flanks.find_normal(flank, q)
         return flank[Flank.NORMAL]
-    return loads[row] + fraction * (loads[row + 1] - loads[row]) if loads.size else 0.0
+    return loads[row] + fraction * (loads[row + 1] - loads[row]) if loads.size else 1.0
 
 
 @njit(**NJIT_CALL)
@@ -337,11 +338,19 @@ def find_point_load(points, index, x, resultant):
         Resultant [N].
     """
     node = points.node[index]
+    if node >= points.nodal.size:
+        return points.averaged[node - points.nodal.size]
     if node >= 0:
         return points.nodal[node]
     if node == LOWER:
         return points.share[index] * interpolate_pressure(x, points.pressure)
     return points.share[index] * resultant
+
+
+@njit(**NJIT_CALL)
+def pick_load(values, row, direction):
+    """Return the load [N] of a rigid point that limits friction in a direction; `row` is that of the loads to +x."""
+    return values[row + Value.START_BACK] if direction < 0 else values[row]
 
 
 @njit(**NJIT_CALL)

@@ -14,6 +14,25 @@ from .motion_kernels import find_modal_energy, solve_holds, sum_products
 
 
 @njit(**NJIT_CALL)
+def average_forces(points):
+    """Write the averages of the forces of the nodes behind each node, as far as they carry load without a gap."""
+    forces = points.nodal
+    n = forces.size
+    for k in range(2):
+        total = 0.0
+        for j in range(n):
+            load = 0.0
+            s = j - 1 + k
+            while forces[j] > 0 and 0 <= s < n - 1 and (forces[s] > 0 or forces[s + 1] > 0):
+                weights = points.averages[k, j, s]
+                load += weights[0] * forces[s] + weights[1] * forces[s + 1]
+                s += 2 * k - 1
+            points.averaged[k * n + j] = load
+            total += load
+        points.averaged[2 * n + k] = total
+
+
+@njit(**NJIT_CALL)
 def find_resultant(system, forces):
     """Return the resultant load at the end of a trial step [N], -1 without a contact set; write the forces of the nodes.
 
@@ -28,6 +47,8 @@ def find_resultant(system, forces):
     if slot < 0:
         return -1.0
     press_state(system.sets, slot, -up, turn, forces)
+    if system.points.averages.size:
+        average_forces(system.points)
     energy = compute_energy(system.sets, slot, up, turn)
     return max(system.sets.reference[REFERENCE_LOAD_INDEX] - energy[1], 0.0)
 

@@ -8,7 +8,7 @@ import numpy as np
 # Points of a block, the entries of a row; of 16, 32 and 48, the fastest for sets of 47 and of 107 points
 WIDTH = 48
 VECTOR = 4  # numbers that a processor handles at once; loops over whole vectors need no remainder
-N_VALUES = 22  # rows of `Value`
+N_VALUES = 24  # rows of `Value`
 
 
 class Law(IntEnum):
@@ -51,6 +51,8 @@ class Value(IntEnum):
     - TOTAL: displacement since the start [m]
     - LAST_SLIDE: SLIDE of the last step [m]
     - WEIGHTED: workspace of the Jacobian
+    - START_BACK, END_BACK: load that limits a slide to -x at the ends of the step [N]; START_LOAD and END_LOAD unless the
+      law averages the pressure behind a point
     """
 
     START_LOAD = 0
@@ -75,6 +77,8 @@ class Value(IntEnum):
     TOTAL = 19 * WIDTH
     LAST_SLIDE = 20 * WIDTH
     WEIGHTED = 21 * WIDTH
+    START_BACK = 22 * WIDTH
+    END_BACK = 23 * WIDTH
 
 
 class Step(NamedTuple):
@@ -162,14 +166,16 @@ class Points(NamedTuple):
     - law, port, count, n_memory (b,): law, port, number of points and used entries of the memory of each block
     - first, first_shear (p + 1,): first block and first shear coordinate of each port
     - numbers (b, k), memory, trial (b, l), values (b, v): arrays of the laws (`time_steps`)
-    - node (b, WIDTH): node whose force is the load of a point; -1 for a fraction `share` of the resultant, -2 for `share`
-      times the pressure of the lower piece at the place of the point
-    - share, place (b, WIDTH): fraction of the resultant or factor of the pressure [N]; position at rest [m]
+    - node (b, s): node whose force is the load of a point; -1 for a fraction `share` of the resultant, -2 for `share`
+      times the pressure of the lower piece at the place of the point. s = WIDTH; 2 WIDTH with the loads of slides to -x
+    - share, place (b, s): fraction of the resultant or factor of the pressure [N]; position at rest [m]
     - shapes (r, b WIDTH), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
     - shear (8, r): see `march_rows_kernels.Shear`
     - is_spring (p,): whether the points of a port are springs, whose work is not friction
     - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
     - nodal (n,): forces of the nodes of a patch [N]
+    - averages (2, n, n - 1, 2): weights of these forces at both ends of a segment in averages for slides to +x and to -x
+    - averaged (2 n + 2,): these averages [N], and their sums; their numbers as nodes begin with n
     - clock (1,): duration of the last step [s], 0 at the start
     - products (r, 2): workspace
     """
@@ -193,5 +199,7 @@ class Points(NamedTuple):
     is_spring: np.ndarray
     pressure: np.ndarray
     nodal: np.ndarray
+    averages: np.ndarray
+    averaged: np.ndarray
     clock: np.ndarray
     products: np.ndarray

@@ -8,10 +8,11 @@ from numpy.polynomial.legendre import leggauss
 from .. import compiled
 from ..contact.set_arrays import PRESENT_SLOT_INDEX, hash_set, make_set_arrays
 from ..core import ModalBasis
-from ..friction.bonds.list_numbers import make_lists, make_no_lists
+from ..friction.bonds.list_numbers import join_lists, make_lists, make_no_lists
 from ..structure.exponentials import exponential
 from .contacts import Contact
 from .march_rows_kernels import (
+    LOWER,
     RESULTANT,
     Flank,
     Options,
@@ -33,6 +34,9 @@ N_LEVELS = 8
 MIN_RANK = (
     1e-6  # smallest singular value, relative to the largest one, of ports that modes move apart
 )
+# Distance of the tables of two lower pieces, and width of the steps at their ends, relative to the length of a table
+TABLE_DISTANCE = 100.0
+END_MARGIN = 1e-9
 N_EVENT_LEVELS = 20  # the same with rigid friction, whose stops and releases are located by halving
 
 
@@ -173,7 +177,7 @@ def make_system(
         float(travel),
         max(float(contact.limit), 1e-300),
         int(has_events),
-        int((points.law == Law.LIST).any()),
+        int(contact.has_lists),
         int(contact.has_loads),
     )
     state = np.zeros((3, 2 * n))
@@ -205,7 +209,8 @@ def _set_start(system: System, contact) -> None:
     is_spring = points.is_spring[points.port].astype(bool)
     points.memory[is_spring, 0] = slides[is_spring]
     is_rigid = points.law == Law.COULOMB
-    limits = points.numbers[:, WIDTH] * values[:, Value.END_LOAD // WIDTH, 0]
+    back, load = (values[:, row // WIDTH, 0] for row in (Value.END_BACK, Value.END_LOAD))
+    limits = points.numbers[:, WIDTH] * np.where(velocities < 0, back, load)
     points.memory[is_rigid, 0] = np.sign(velocities)[is_rigid]
     values[is_rigid, Value.START // WIDTH, 0] = (limits * points.memory[:, 0])[is_rigid]
     if contact.sets is not None:
@@ -219,7 +224,7 @@ def _climb_first(system: System, contact) -> None:
     """Give the lifted mass the vertical velocity of the flank, and the points the normal force there."""
     ratio = find_first_climb(system, contact)
     points = system.points
-    for row in (Value.START_LOAD, Value.END_LOAD):
+    for row in (Value.START_LOAD, Value.END_LOAD, Value.START_BACK, Value.END_BACK):
         points.values[:, row : row + WIDTH] *= ratio
     is_bonds = points.law == Law.BONDS
     points.memory[is_bonds, WIDTH:] *= ratio
@@ -289,9 +294,12 @@ def _make_points(contact, n_ports: int) -> Points:
     numbers = np.zeros((n_blocks, max([2 * WIDTH, *(part.numbers.shape[1] for part in blocks)])))
     memory = np.zeros((n_blocks, max([WIDTH, *(part.memory.shape[1] for part in blocks)])))
     values = np.zeros((n_blocks, N_VALUES * WIDTH))
-    node = np.full((n_blocks, WIDTH), RESULTANT, np.int64)
-    share = np.zeros((n_blocks, WIDTH))
-    place = np.zeros((n_blocks, WIDTH))
+    # Rows of a slide to +x, and a second one to -x where the loads differ
+    n_rows = 1 + any(point_set.law.back is not None for point_set in sets)
+    shifts, pressure = _join_pressures(sets)
+    node = np.full((n_rows, n_blocks, WIDTH), RESULTANT, np.int64)
+    share = np.zeros(node.shape)
+    place = np.zeros(node.shape)
     n_moving = n_ports - len(sets)  # ports of heave and pitch have no points
     shears = [point_set.shear for point_set in sets]
     n_shear = [0 if shear is None else len(shear.stiffness) for shear in shears]
@@ -310,15 +318,22 @@ def _make_points(contact, n_ports: int) -> Points:
         memory[first:end, : part.memory.shape[1]] = part.memory
         for row in (Value.START_LOAD, Value.END_LOAD):
             values[first:end, row : row + WIDTH] = part.load
-        # A single point carries a prescribed load that is 0 at the start.
-        share[first:end] = part.load / resultant if resultant > 0 else 1.0
+            values[first:end, row + Value.START_BACK : row + Value.START_BACK + WIDTH] = part.back
         size = point_set.law.load.size
         places = slice(WIDTH * first, WIDTH * first + size)
-        if point_set.nodes is not None:
-            node.reshape(-1)[places] = point_set.nodes
-        if point_set.shares is not None:
-            share.reshape(-1)[places] = point_set.shares
-            place.reshape(-1)[places] = point_set.places
+        for row, load in enumerate([part.load, part.back][:n_rows]):
+            # A single point carries a prescribed load that is 0 at the start.
+            share[row, first:end] = load / resultant if resultant > 0 else 1.0
+            if point_set.nodes is not None:
+                node[row].reshape(-1)[places] = np.broadcast_to(point_set.nodes, (n_rows, size))[
+                    row
+                ]
+            if point_set.lower is not None:
+                node[row].reshape(-1)[places] = LOWER
+                share[row].reshape(-1)[places] = point_set.lower.shares
+                place[row].reshape(-1)[places] = (
+                    point_set.lower.places + shifts[p][-1 if row else 0]
+                )
         if point_set.shear is not None:
             own = slice(first_shear[p], first_shear[p + 1])
             shape = np.asarray(point_set.shear.shape).T
@@ -341,30 +356,52 @@ def _make_points(contact, n_ports: int) -> Points:
         memory,
         memory.copy(),
         values,
-        node,
-        share,
-        place,
+        *(np.hstack(array) for array in (node, share, place)),
         shapes,
         stiffness,
         shear,
         np.array([point_set.is_spring for point_set in sets] + [False] * n_moving, bool),
-        np.zeros((2, 0)) if contact.pressure is None else np.array(contact.pressure, float),
+        pressure,
         np.zeros(n_nodes),
+        np.zeros((0, 0, 0, 0)) if contact.averages is None else contact.averages,
+        np.zeros(0 if contact.averages is None else 2 * n_nodes + 2),
         np.zeros(1),
         np.zeros((stiffness.size, 2)),
     )
 
 
+def _join_pressures(sets) -> tuple[list[list[float]], np.ndarray]:
+    """Return by how much the places of each set of points are shifted [m], for each of its tables, and one table (2, k).
+
+    The tables of the pressures on lower pieces stand so far apart that no slide leads from one to the next.
+    """
+    shifts = []
+    parts = []
+    end = 0.0
+    for point_set in sets:
+        shifts.append([])
+        for places, pressures in () if point_set.lower is None else point_set.lower.tables:
+            # The first table keeps its places; the pressure is 0 beyond the ends of all.
+            margin = END_MARGIN * (places[-1] - places[0])
+            shift = end - places[0] if parts else 0.0
+            ends = [places[0] - margin, *places, places[-1] + margin]
+            parts.append([np.add(ends, shift), [0.0, *pressures, 0.0]])
+            shifts[-1].append(shift)
+            end = ends[-1] + shift + TABLE_DISTANCE * (places[-1] - places[0])
+    if len(parts) == 1:
+        return shifts, np.array(parts[0])[:, 1:-1]
+    return shifts, np.concatenate([np.zeros((2, 0)), *parts], axis=1)
+
+
 def _make_lists(contact, points: Points):
     """Return the lists of bonds (`strip_rows_kernels.BondLists`), and number the points that have one."""
-    is_list = points.law == Law.LIST
-    if not is_list.any():
+    if not contact.has_lists:
         return make_no_lists(0)
-    is_used = is_list[:, None] & (np.arange(WIDTH) < points.count[:, None])
+    is_used = (points.law == Law.LIST)[:, None] & (np.arange(WIDTH) < points.count[:, None])
     indices = points.numbers[:, ListRow.INDEX : ListRow.INDEX + WIDTH]
     indices[is_used] = np.arange(is_used.sum())
-    loads = points.values[:, Value.END_LOAD : Value.END_LOAD + WIDTH]
-    return make_lists(*contact.bond_sum, loads[is_used])
+    sets = [point_set for point_set in contact.point_sets if point_set.bond_sum is not None]
+    return join_lists([make_lists(*part.bond_sum, part.law.load) for part in sets])
 
 
 def _count_memory(sets, blocks) -> np.ndarray:

@@ -133,7 +133,7 @@ def load_kernels(contact: Contact, say=None):
     if contact.sets is None:
         parts["normal"] = "time_steps.no_normal_kernels"
     lists = {}
-    if contact.bond_sum is None:
+    if not contact.has_lists:
         lists["lists"] = "time_steps.no_lists_kernels"
     steps = compiled.instantiate("time_steps.march_kernels", parts | lists, say)
     return compiled.instantiate("time_steps.loop_kernels", parts | {"steps": steps}, say)

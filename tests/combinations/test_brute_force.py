@@ -48,6 +48,7 @@ LAWS = {
     "elastic-plastic": 'bond_length = "1 um"\n',
     "stiffness": f'stiffness = "{STIFFNESS} N/m"\n',
     "nonlocal": 'bond_length = "1 um"\n',
+    "convolution": 'bond_length = "1 mm"\n',
     "iwan": f'stiffness = "{STIFFNESS} N/m"\nchi = -0.5\nbeta = 0.5\n',
     "bouc-wen": f'stiffness = "{STIFFNESS} N/m"\nexponent = 2.0\n',
     "lugre": f'stiffness = "{STIFFNESS} N/m"\nstribeck_speed = "10 mm/s"\nkinetic = 0.25\n'
@@ -190,14 +191,27 @@ SUPPORTED = {
     "shear": (
         PATCH + SHEAR + "{}" + RIG,
         400,
-        ("coulomb", "elastic-plastic", "nonlocal", "tanh", "iwan", "bouc-wen", "lugre"),
+        (
+            "coulomb",
+            "elastic-plastic",
+            "nonlocal",
+            "convolution",
+            "tanh",
+            "iwan",
+            "bouc-wen",
+            "lugre",
+        ),
     ),
     "pitch": (
         PATCH + "{}" + PITCH,
         400,
-        ("coulomb", "tanh", "nonlocal", "stiffness", "iwan", "lugre"),
+        ("coulomb", "convolution", "tanh", "nonlocal", "stiffness", "iwan", "lugre"),
     ),
-    "pitch and shear": (PATCH + SHEAR + "{}" + PITCH, 400, ("elastic-plastic", "nonlocal")),
+    "pitch and shear": (
+        PATCH + SHEAR + "{}" + PITCH,
+        400,
+        ("elastic-plastic", "nonlocal", "convolution"),
+    ),
     "grooves": (
         POINT + GROOVES.format("normal") + "{}" + RIG,
         2000,
@@ -221,23 +235,27 @@ SUPPORTED = {
         + "{}"
         + BENCH,
         400,
-        ("coulomb", "elastic-plastic", "nonlocal", "tanh"),
+        ("coulomb", "elastic-plastic", "nonlocal", "convolution", "tanh"),
     ),
     "lower": (
         PATCH.replace('"8 m"', '"8 m"\non = "lower"') + "{}" + RIG,
         400,
-        ("nonlocal", "tanh", "iwan"),
+        ("nonlocal", "convolution", "tanh", "iwan"),
     ),
     "bench": (
         POINT + AMPLITUDE_OF_LOAD + "{}" + BENCH,
         2000,
         ("stiffness", "iwan", "bouc-wen", "lugre"),
     ),
-    "bench with shear": (PATCH + SHEAR + "{}" + BENCH, 400, ("tanh", "iwan", "bouc-wen", "lugre")),
+    "bench with shear": (
+        PATCH + SHEAR + "{}" + BENCH,
+        400,
+        ("convolution", "tanh", "iwan", "bouc-wen", "lugre"),
+    ),
     "bench with lower": (
         PATCH.replace('"8 m"', '"8 m"\non = "lower"') + SHEAR + "{}" + BENCH,
         400,
-        ("coulomb", "elastic-plastic", "bouc-wen"),
+        ("coulomb", "convolution", "elastic-plastic", "bouc-wen"),
     ),
 }
 CASES = [(name, law) for name, row in SUPPORTED.items() for law in row[2]]

@@ -37,7 +37,6 @@ SETS = {
     "kinetic below static": "{law}.law=coulomb {law}.kinetic=0.2",
     "law for a constant load": IWAN,
     "law for flat faces": IWAN,
-    "law for one interface": "{law}.law=convolution {law}.bond_length=1_um",
     "law for rigid pieces": IWAN,
     "law without parallel elements": IWAN,
     "law of an averaged pressure": "{law}.law=convolution {law}.bond_length=1_um",
@@ -81,7 +80,6 @@ SETS = {
     "wear": WEAR,
     "wear.start": "wear.start=result.nc",
 }  # fmt: skip
-SINGLE = PAIR[: PAIR.rindex("[[structure.interface]]")]
 # Property of a joint in a message, after re.escape
 PROPERTY = re.compile(r"\\\{.*?\}")
 # More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
@@ -90,9 +88,6 @@ MORE_SETS = {
     "structure.measured=stuck, mode with yaw": "{patch}.area.cells=64",
     "mode with yaw, bands that slip together, partial slip": f"{BONDS} {{patch}}.area.cells=64",
     "wear, mode with yaw, partial slip": "{law}.law=coulomb {patch}.area.cells=64",
-    "shape on the lower piece, interface": BONDS,
-    "law for one interface, several interfaces": f"{BONDS} {{law}}.order=2",
-    "mode with yaw, patch.area, rig, law for one interface": f"{BONDS} {{law}}.order=2",
 }
 REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
     '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\nboundary = [1, 2]\nslide = [1, 0]\n'
@@ -124,9 +119,6 @@ def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
     words["change"] = SETS["mode with heave or pitch"]
     if features == {"shape on the lower piece", "law without bonds", "partial slip"}:
         return PATCH_BENCH, words
-    if features == {"law for one interface", "patch of an interface"}:
-        law = "structure.interface.0"
-        return SINGLE + FORCED, words | {"law": law, "patch": f"{law}.contact"}
     if features & (MASS_FEATURES | {"patch of an interface"}):
         law = "structure.interface.0"
         return PAIR + FORCED, words | {"law": law, "patch": f"{law}.contact"}
@@ -196,7 +188,6 @@ def test_refuses_each_cause_of_a_feature(text, changes, words):
 
 # Two rows that apply to a scene at the same key: (features of both, the key, end of the only message at it).
 OVERLAPS = [
-    ("patch.area, law of an averaged pressure, partial slip", "contact.area", "leave out this entry"),
     ("normal.amplitude, bench, law for flat faces, normal.grooves", "normal.amplitude", "leave one of the two out"),
 ]  # fmt: skip
 

@@ -8,8 +8,7 @@ from patchfem.friction import Bonds
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.time_steps import laws
-from patchfem.time_steps.contacts import Contact, PointSet
-from patchfem.time_steps.march_rows_kernels import LOWER
+from patchfem.time_steps.contacts import Contact, LowerPressure, PointSet
 
 
 def make_coulomb(static, kinetic, load=1.0):
@@ -45,14 +44,14 @@ def make_bond_contact(bonds, force, row, shear=None, bond_sum=None, lower=None) 
     below = {}
     if lower is not None:
         lower = np.array(lower, float)
-        below = {"nodes": np.full(loads.size, LOWER), "shares": loads, "places": lower[0]}
+        below = {"lower": LowerPressure(lower[0], loads, (lower,))}
         loads = loads * lower[1]
     law = laws.make_bonds(bonds, loads) if bond_sum is None else laws.make_list(bonds, loads)
     if below:
         law = laws.keep_loads(law)
-    points = replace(PointSet(law, row, None, shear), **below)
+    points = replace(PointSet(law, row, None, shear), bond_sum=bond_sum, **below)
     limit = bonds.static * float(loads.sum())
-    return Contact([points], limit, bonds.length, bond_sum=bond_sum, pressure=lower)
+    return Contact([points], limit, bonds.length)
 
 
 def make_pressed_contact(law, force, row, shear=None, bond_sum=None, **load) -> Contact:
@@ -73,5 +72,5 @@ def make_pressed_contact(law, force, row, shear=None, bond_sum=None, **load) -> 
         length = law.bond_length
         points = laws.make_cells(law.static, length, loads)
     limit = (law.static or 1.0) * max(float(loads.sum()), 1e-9)
-    point_sets = [PointSet(points, row, nodes, shear)]
-    return Contact(point_sets, limit, length, bond_sum=bond_sum, preload=float(loads.sum()), **load)
+    point_sets = [PointSet(points, row, nodes, shear, bond_sum=bond_sum)]
+    return Contact(point_sets, limit, length, preload=float(loads.sum()), **load)

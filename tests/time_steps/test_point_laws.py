@@ -41,7 +41,7 @@ class Point:
         self.memory = blocks.memory[0].copy()
         self.trial = self.memory.copy()
         self.values = np.zeros(N_VALUES * WIDTH)
-        self.values[Value.END_LOAD] = law.load[0]
+        self.values[Value.END_LOAD] = self.values[Value.END_BACK] = law.load[0]
         self.slide_law = load_compiled_module("time_steps.laws_kernels").slide_law
         self.slide(0.0, 0.0, LOAD, 0.0)
 
@@ -51,10 +51,10 @@ class Point:
         values = self.values
         values[Value.START] = last[Value.END]
         values[Value.START_VELOCITY] = last[Value.VELOCITY]
-        values[Value.START_LOAD] = last[Value.END_LOAD]
+        values[Value.START_LOAD] = values[Value.START_BACK] = last[Value.END_LOAD]
         values[Value.SLIDE] = slide
         values[Value.VELOCITY] = velocity
-        values[Value.END_LOAD] = load
+        values[Value.END_LOAD] = values[Value.END_BACK] = load
         step = Step(duration, 1 / duration if duration else 0.0, 0.0)
         self.slide_law(int(self.law.law), self.numbers, self.memory, self.trial, values, 1, step)
         out = values.copy()

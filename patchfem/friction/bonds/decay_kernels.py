@@ -43,7 +43,7 @@ def find_decay(age, law):
     """
     # Beyond the end of the table the strength is 0 to round-off.
     start = law[ListLaw.TABLE]
-    n_cells = (law.size - ListLaw.TABLE - 1) // N_COEFFICIENTS
+    n_cells = int(law[ListLaw.N_CELLS])
     place = min(max((age - start) * N_CELLS_PER_AGE, 0.0), float(n_cells))
     cell = min(int(place), n_cells - 1)
     t = 2 * (place - cell) - 1

@@ -85,7 +85,9 @@ def make_lists(bonds: Bonds, reach: float, merge: float, loads) -> BondLists:
     law[ListLaw.CUTOFF] = min(reach, max_age) * (1.0 if is_stretch else bonds.length)
     law[ListLaw.JOIN_ERROR] = max(JOIN_ERROR * merge**2, EXACT_JOIN)
     law[ListLaw.JOIN_AGE] = JOIN_AGE + JOIN_AGE_PER_ORDER * max(bonds.order - 1, 0.0)
-    law = np.append(law, tabulate_decay(bonds.order, -max_age if is_stretch else 0.0))
+    table = tabulate_decay(bonds.order, -max_age if is_stretch else 0.0)
+    law[ListLaw.N_CELLS] = table.size // N_COEFFICIENTS
+    law = np.append(law, table)
 
     # The initial bonds are a strip that formed at once, without stretch.
     capacity = MAX_STRIPS if merge else N_UNMERGED_STRIPS // loads.size + MAX_STRIPS
@@ -98,10 +100,25 @@ def make_lists(bonds: Bonds, reach: float, merge: float, loads) -> BondLists:
     states[:, ListState.COUNT] = float(bonds.initial > 0)
     states[:, ListState.LENGTH] = bonds.length
     states[:, ListState.LOAD] = loads
-    return BondLists(strips, states, law, growth_numbers(bonds))
+    rows = np.tile(law, (loads.size, 1)), np.tile(growth_numbers(bonds), (loads.size, 1))
+    return BondLists(strips, states, *rows)
+
+
+def join_lists(parts) -> BondLists:
+    """Return the lists of several groups of points as those of one group, each with the room of the longest."""
+    room = max(part.strips.shape[1] for part in parts)
+    size = max(part.law.shape[1] for part in parts)
+    strips = [np.pad(p.strips, ((0, 0), (0, room - p.strips.shape[1]), (0, 0))) for p in parts]
+    laws = [np.pad(part.law, ((0, 0), (0, size - part.law.shape[1]))) for part in parts]
+    return BondLists(
+        np.concatenate(strips),
+        np.concatenate([part.states for part in parts]),
+        np.concatenate(laws),
+        np.concatenate([part.growth for part in parts]),
+    )
 
 
 def make_no_lists(count: int) -> BondLists:
     """Return the empty lists of `count` points whose law needs none."""
-    empty = np.zeros(0)
+    empty = np.zeros((count, 0))
     return BondLists(np.zeros((count, 0, 0)), np.zeros((count, len(ListState))), empty, empty)

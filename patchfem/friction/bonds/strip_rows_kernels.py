@@ -77,7 +77,8 @@ class ListLaw(IntEnum):
     - CUTOFF: age beyond which bonds are dropped, in the unit of `Strip.age_1`
     - JOIN_ERROR: error up to which strips of age 0 are joined, relative to the load
     - JOIN_AGE: path in bond lengths over which this error grows e-fold, because older bonds carry less
-    - TABLE: first age of the table of `decay_kernels.find_decay`, whose coefficients follow
+    - N_CELLS, TABLE: number of polynomials of the table of `decay_kernels.find_decay`, and its first age, which the
+      coefficients follow
     """
 
     ORDER = 0
@@ -87,7 +88,8 @@ class ListLaw(IntEnum):
     CUTOFF = 4
     JOIN_ERROR = 5
     JOIN_AGE = 6
-    TABLE = 7
+    N_CELLS = 7
+    TABLE = 8
 
 
 class BondLists(NamedTuple):
@@ -95,8 +97,8 @@ class BondLists(NamedTuple):
 
     - strips: (m, capacity, 8) entries of `Strip`
     - states: (m, 9) entries of `ListState`
-    - law: (k,) entries of `ListLaw`, followed by the table
-    - growth: (5,) parameters of eq. 2.10, see `point_rows_kernels.GrowthNumbers`
+    - law: (m, k) entries of `ListLaw`, followed by the table
+    - growth: (m, 5) parameters of eq. 2.10, see `point_rows_kernels.GrowthNumbers`
     """
 
     strips: np.ndarray
@@ -110,7 +112,8 @@ class BondList(NamedTuple):
 
     - strips: (capacity, 8)
     - state: (9,)
-    - law, growth: those of all points
+    - law: (k,)
+    - growth: (5,)
     """
 
     strips: np.ndarray

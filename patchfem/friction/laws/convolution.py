@@ -18,6 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import gammainc, gammainccinv
 
+from .coulomb import Coulomb
+
 # Number of positions that are averaged at a time; nodes beyond the cut-off of the whole block are
 # left out
 N_POSITIONS_PER_BLOCK = 64
@@ -36,6 +38,11 @@ class SlidingLimits(NamedTuple):
     backward: float
 
 
+def from_keys(friction, load: float) -> Coulomb:
+    """Return Coulomb's law, which acts on the averaged pressure; load [N] is not used."""
+    return Coulomb(friction.static, friction.static)
+
+
 def _bond_gammainc(order: float, x):
     """Return P(order + 1, x), the regularised lower incomplete gamma function.
 
@@ -50,6 +57,31 @@ def _bond_gammainc(order: float, x):
     if order == 2:
         value = value - x * x * decay / 2
     return value
+
+
+def compute_segment_weights(positions, nodes, length: float, order: float) -> np.ndarray:
+    """Return the weights (n, m - 1, 2) of both nodes of each segment in the averages of a slide to +x.
+
+    Parameters
+    ----------
+    positions : (n,) array
+        Positions at which the averages are taken [m].
+    nodes : (m,) array
+        Positions of the nodes [m], increasing.
+    length : float
+        Bond length eps [m].
+    order : float
+        Order p of the kernel phi.
+    """
+    # The average is over the path behind a position: distances s >= 0 to the nodes below it
+    distance = positions[:, None] - nodes
+    x = np.maximum(distance, 0.0) / length
+    # These are the integrals of phi and of phi s over each segment; the pressure is linear between
+    # its two nodes.
+    zeroth = -np.diff(_bond_gammainc(order, x), axis=1)
+    first = -(order + 1) * length * np.diff(_bond_gammainc(order + 1, x), axis=1)
+    second_node = (distance[:, :-1] * zeroth - first) / np.diff(nodes)
+    return np.stack([zeroth - second_node, second_node], axis=2)
 
 
 def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.ndarray:
@@ -68,15 +100,7 @@ def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.
     order : float
         Order p of the kernel phi.
     """
-    # The average is over the path behind a position: distances s >= 0 to the nodes below it
-    distance = positions[:, None] - nodes
-    x = np.maximum(distance, 0.0) / length
-    # These are the integrals of phi and of phi s over each segment; the pressure is linear between
-    # its two nodes.
-    zeroth = -np.diff(_bond_gammainc(order, x), axis=1)
-    first = -(order + 1) * length * np.diff(_bond_gammainc(order + 1, x), axis=1)
-    second_node = (distance[:, :-1] * zeroth - first) / np.diff(nodes)
-
+    parts = compute_segment_weights(positions, nodes, length, order)
     segment = np.clip(np.searchsorted(nodes, positions) - 1, 0, nodes.size - 2)
     # Segments without pressure divide the interface into islands; only the island of a position
     # contributes to its average.
@@ -84,8 +108,8 @@ def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.
     is_beyond = positions > nodes[-1]
     is_averaged = (island == island[segment][:, None]) & ~is_bare & ~is_beyond[:, None]
     weights = np.zeros((positions.size, nodes.size))
-    weights[:, :-1] += np.where(is_averaged, zeroth - second_node, 0.0)
-    weights[:, 1:] += np.where(is_averaged, second_node, 0.0)
+    weights[:, :-1] += np.where(is_averaged, parts[:, :, 0], 0.0)
+    weights[:, 1:] += np.where(is_averaged, parts[:, :, 1], 0.0)
     return weights
 
 

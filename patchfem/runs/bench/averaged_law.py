@@ -1,7 +1,7 @@
-"""Friction law with a spatially averaged pressure, for a bench run or a rigidly sliding block.
+"""Friction law with a spatially averaged pressure, for points of a patch or a rigidly sliding block.
 
-In: a model with law 'convolution' and its Patch with the static contact solution. Out: the averaged pressure, the ratio
-of the slip force to mu_s N, and nodal tractions.
+In: the keys of law 'convolution' and a Patch with the static contact solution. Out: the averaged pressure, the loads that
+limit the friction of the nodes in both directions, the ratio of the slip force to mu_s N, and nodal tractions.
 """
 
 import numpy as np
@@ -13,21 +13,16 @@ from ...effects import describe_unsupported, import_effect, law_has_trait
 EQUAL_FRICTION_LIMITS_TOL = 1e-9
 
 
-def _import_averaged_law():
-    """Import the module of the averaged friction law, which is loaded only if a scene needs it."""
-    return import_effect("friction.law=convolution")
-
-
-def find_tractions(model, patch, direction: float, offset: float = 0.0) -> np.ndarray:
+def find_tractions(keys, patch, direction: float, offset: float = 0.0) -> np.ndarray:
     """Return the averaged pressure (m,) [Pa] at the loaded nodes of the upper piece, or 0 at open nodes.
 
     The law averages the pressure over the part of the surface that the node has just passed, that is, behind it in the
-    direction of the motion.
+    direction of the motion. The cells of a face are averaged along their row.
 
     Parameters
     ----------
-    model : Model
-        Model with a law whose pressure is averaged along the motion.
+    keys : Friction
+        Effective keys of a law whose pressure is averaged along the motion.
     patch : Patch
         Solved patch, whose pressure is averaged.
     direction : float
@@ -35,54 +30,100 @@ def find_tractions(model, patch, direction: float, offset: float = 0.0) -> np.nd
     offset : float
         Displacement [m] of the upper piece over the pressure, which ends where the lower piece does.
     """
-    friction = model.friction
+    average_pressure = import_effect("friction.law=convolution").average_pressure
+    n_rows = 1 if patch.model.area is None else patch.shape[0]
+    rows = []
+    for x, sigma in zip(patch.x.reshape(n_rows, -1), patch.pressure.sigma_n.reshape(n_rows, -1)):
+        average = average_pressure(x + offset, x, sigma, direction, keys.bond_length, keys.order)
+        is_loaded = np.interp(x + offset, x, sigma, left=0.0, right=0.0) > 0
+        rows.append(np.where(is_loaded, average, 0.0))
+    return np.concatenate(rows)
+
+
+def find_loads(keys, patch) -> np.ndarray | None:
+    """Return the loads (2, m) [N] that limit the friction of the nodes of a patch in slides to +x and to -x.
+
+    They are None without a patch, and for a law that does not average the pressure.
+
+    Parameters
+    ----------
+    keys : Friction
+        Effective keys of the law.
+    patch : Patch or None
+        Solved patch.
+    """
+    if patch is None or not law_has_trait(keys.law, "averaged"):
+        return None
+    tractions = [find_tractions(keys, patch, direction) for direction in (1.0, -1.0)]
+    return np.array(tractions) * patch.pieces.interface.weight
+
+
+def make_averages(keys, patch) -> np.ndarray | None:
+    """Return the weights (2, m, m - 1, 2) by which averages follow from nodal forces, for slides to +x and to -x.
+
+    Entry (k, j, s, i) is the share of the load that limits node j that end i of segment s gives per newton. They are None
+    for a law that does not average the pressure.
+
+    Parameters
+    ----------
+    keys : Friction
+        Effective keys of the law.
+    patch : Patch
+        Patch whose pressure changes.
+    """
+    if not law_has_trait(keys.law, "averaged"):
+        return None
     x = patch.x
-    sigma = patch.pressure.sigma_n
-    average = _import_averaged_law().average_pressure(
-        x + offset, x, sigma, direction, friction.bond_length, friction.order
-    )
-    return np.where(np.interp(x + offset, x, sigma, left=0.0, right=0.0) > 0, average, 0.0)
+    area = patch.pieces.interface.weight
+    law = import_effect("friction.law=convolution")
+    forward = law.compute_segment_weights(x, x, keys.bond_length, keys.order)
+    back = law.compute_segment_weights(-x[::-1], -x[::-1], keys.bond_length, keys.order)
+    weights = np.stack([forward, back[::-1, ::-1, ::-1]])
+    return weights * area[:, None, None] / np.stack([area[:-1], area[1:]], axis=1)
 
 
-def slip_force_ratio(model, patch) -> float:
+def slip_force_ratio(keys, patch) -> float:
     """Return the ratio of the force at which a rigid block slips to static coefficient times load.
 
     It is 1 unless the law averages the pressure along the slide, as the law 'convolution' does.
+
+    Parameters
+    ----------
+    keys : Friction
+        Effective keys of the law.
+    patch : Patch or None
+        Solved patch.
 
     Raises
     ------
     PatchfemError
         If the slip force differs between the two directions of sliding.
     """
-    f = model.friction
-    if patch is None or not law_has_trait(f.law, "averaged"):
+    loads = find_loads(keys, patch)
+    if loads is None:
         return 1.0
-    weight = patch.pieces.interface.weight
-    sigma = patch.pressure.sigma_n
-    forward, back = _import_averaged_law().sliding_limits(
-        patch.x, sigma, weight, f.bond_length, f.order
-    )
+    forward, back = loads.sum(axis=1)
     if abs(forward - back) > EQUAL_FRICTION_LIMITS_TOL * max(forward, back):
         raise PatchfemError(
             describe_unsupported(
-                f"law '{f.law}' with a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "
-                f"{back * f.static:.6g} N back)",
-                "make the patch symmetric, or prescribe the slide with a table [slide]",
+                f"law '{keys.law}' with a pressure that is not symmetric (slip force {forward * keys.static:.6g} N "
+                f"forward, {back * keys.static:.6g} N back)",
+                "march",
             ),
-            "friction.law",
+            "accuracy.method",
         )
     return (forward + back) / 2 / patch.pressure.load
 
 
-def distribute_slip_force(model, patch, forces, offsets) -> np.ndarray:
+def distribute_slip_force(keys, patch, forces, offsets) -> np.ndarray:
     """Distribute the friction force of a slipping rigid block over its nodes.
 
     The tractions are proportional to the pressure averaged in the direction of the force.
 
     Parameters
     ----------
-    model : Model
-        Model with a law whose pressure is averaged along the motion.
+    keys : Friction
+        Effective keys of a law whose pressure is averaged along the motion.
     patch : Patch
         Solved patch, which gives nodes and pressure.
     forces, offsets : (f,)
@@ -95,6 +136,6 @@ def distribute_slip_force(model, patch, forces, offsets) -> np.ndarray:
     """
     tractions = np.zeros((len(forces), patch.x.size))
     for row, force, offset in zip(tractions, forces, offsets):
-        traction = find_tractions(model, patch, 1.0 if force >= 0 else -1.0, offset)
+        traction = find_tractions(keys, patch, 1.0 if force >= 0 else -1.0, offset)
         row += force * traction / max(patch.pieces.interface.weight @ traction, 1e-300)
     return tractions

@@ -20,7 +20,7 @@ from ...model.model import MIN_RIG_REST_SPEED
 from ...slip import shear_modes
 from ...time_steps import contacts, laws, systems
 from ..patch import store
-from . import shear
+from . import averaged_law, shear
 
 # Largest number of shear modes of laws whose points have the compliance of the modes left out: for Coulomb's law the loop
 # area then has an error of 5e-4
@@ -35,17 +35,6 @@ N_FALL_SAMPLES = 400
 MAX_FALL_GROWTH = 1e-8
 
 
-class LowerPlaces(NamedTuple):
-    """Points that slide over the pressure of the lower piece.
-
-    - x (m,): positions of the points [m]; one for the resultant
-    - shares (m,): load [N] of each point where the relative pressure is 1
-    """
-
-    x: np.ndarray
-    shares: np.ndarray
-
-
 class Surface(NamedTuple):
     """Interface, or a band of its face.
 
@@ -56,8 +45,9 @@ class Surface(NamedTuple):
     - row (n,): slide per modal coordinate
     - has_half_cells: whether an Iwan model has half of its cells, to estimate their error
     - rise: load of the points at the start over their mean load
-    - lower: LowerPlaces if the pressure belongs to the lower piece, or None
+    - lower: LowerPressure if the pressure belongs to the lower piece, or None
     - bond_sum: sum over lists of bonds, or None
+    - limits (2, m): loads [N] that limit friction in slides to +x and to -x, if the law averages the pressure, or None
     """
 
     keys: object
@@ -67,17 +57,18 @@ class Surface(NamedTuple):
     row: np.ndarray
     has_half_cells: bool = False
     rise: float = 1.0
-    lower: LowerPlaces | None = None
+    lower: contacts.LowerPressure | None = None
     bond_sum: object = None
+    limits: np.ndarray | None = None
 
 
-def sums_over_lists(model) -> bool:
-    """Return whether the bonds of a model are summed one by one.
+def sums_over_lists(model, keys=None) -> bool:
+    """Return whether the bonds of a law are summed one by one; without its keys, of the first interface of a model.
 
     A list keeps the load under which a bond formed, but the bonds of order 1 break as the load falls. So a named sum does
     not replace their recursion under a load that changes.
     """
-    keys = model.friction
+    keys = keys or model.friction
     if not law_has_trait(keys.law, "bonds") or needs_bond_list(keys):
         return needs_bond_list(keys)
     changes = model.load_varies or model.grooves is not None
@@ -86,20 +77,28 @@ def sums_over_lists(model) -> bool:
     return not changes and model.accuracy.quadrature not in ("auto", "recursion")
 
 
-def make_bond_sum(model, choice):
+def make_bond_sum(model, keys, choice):
     """Return the settings of a sum over lists of bonds (`time_steps.contacts.BondSum`); None without a list.
 
     Parameters
     ----------
     model : Model
-        Model with the law of the bonds.
+        Model with the expected speed of the slide.
+    keys : Friction
+        Effective keys of the law.
     choice : EngineChoice or None
         Method of bond summation.
     """
-    if choice is None or choice.engine == "recursion":
+    if not sums_over_lists(model, keys):
         return None
-    law = model.bonds
+    law = _make_bonds(model, keys)
     return contacts.BondSum(law, choice.reach(law.order), choice.merge)
+
+
+def _make_bonds(model, keys):
+    """Return the parameters of the bonds of a law, whose effective keys are given, at the speed of a model."""
+    min_rest_speed = 0.0 if model.rig is None else MIN_RIG_REST_SPEED
+    return make_bond_parameters(keys, model.speed_scale, min_rest_speed)
 
 
 def make_contact(model, patch, choice=None, *, has_half_cells: bool = False) -> contacts.Contact:
@@ -127,16 +126,17 @@ def make_contact(model, patch, choice=None, *, has_half_cells: bool = False) -> 
         patch if model.partial_slip else None,
         np.zeros(0),
         has_half_cells,
-        bond_sum=make_bond_sum(model, choice),
+        bond_sum=make_bond_sum(model, model.friction, choice),
+        limits=averaged_law.find_loads(model.friction, patch),
     )
     surface = place_surface(model, patch, surface)
     limit = model.friction.static * float(force.sum())
     if model.grooves is not None:
         limit = model.grooves.max_force(fields["preload"], model.friction.static)
-    return join_points([make_points(model, surface)], limit, surface.bond_sum, fields)
+    return join_points([make_points(model, surface)], limit, fields)
 
 
-def join_points(point_sets, limit: float, bond_sum, fields: dict) -> contacts.Contact:
+def join_points(point_sets, limit: float, fields: dict) -> contacts.Contact:
     """Return the Contact of some sets of points, the first of which are interfaces.
 
     Parameters
@@ -145,13 +145,10 @@ def join_points(point_sets, limit: float, bond_sum, fields: dict) -> contacts.Co
         Interfaces, then springs.
     limit : float
         Friction limit of all interfaces [N].
-    bond_sum : BondSum or None
-        Sum over lists of bonds.
     fields : dict
         Fields of a Contact that describe the load.
     """
-    length = _find_length(point_sets)
-    return contacts.Contact(point_sets, limit, length, bond_sum=bond_sum, **fields)
+    return contacts.Contact(point_sets, limit, _find_length(point_sets), **fields)
 
 
 def place_surface(model, patch, surface: Surface) -> Surface:
@@ -173,11 +170,8 @@ def place_surface(model, patch, surface: Surface) -> Surface:
     elif model.load_varies:
         rise = float(model.point.evaluate(np.zeros(1))[0] / model.point.load)
     lower = None
-    if patch is not None and model.side == "lower" and model.grooves is None:
-        lower = LowerPlaces(np.zeros(1), np.array([surface.force.sum()]))
-        if not _acts_on_resultant(model):
-            shares = shear.mean_loaded_pressure(patch) * patch.pieces.interface.weight
-            lower = LowerPlaces(patch.x, shares)
+    if patch is not None and patch.model.gap.side == "lower" and model.grooves is None:
+        lower = _place_on_lower_piece(patch, surface)
     return surface._replace(rise=rise, lower=lower)
 
 
@@ -189,29 +183,34 @@ def find_load_fields(model, patch) -> dict:
     if model.load_varies:
         preload = float(model.point.evaluate(np.zeros(1))[0])
         return {"load": model.point.evaluate, "preload": preload}
-    if patch is not None and model.side == "lower":
-        return {"pressure": _tabulate_pressure(model, patch)}
     return {}
 
 
-def _acts_on_resultant(model) -> bool:
-    """Return whether one point carries the load on a patch over the lower piece, which suffices for a law without memory."""
-    return law_has_trait(model.friction.law, "memoryless") and not model.partial_slip
+def _place_on_lower_piece(patch, surface: Surface) -> contacts.LowerPressure:
+    """Return the places of the points of a surface over the pressure of the lower piece of a patch.
 
-
-def _tabulate_pressure(model, patch) -> np.ndarray:
-    """Return places [m] and relative pressures (2, k) of the lower piece, or slides and relative loads of the resultant.
-
-    The resultant at a slide is the load of the part of the lower piece that the upper one covers.
+    One point carries the whole load under a law without memory on rigid pieces. Its table has slides and relative loads in
+    place of places and relative pressures: at a slide it carries the load of the part of the lower piece that the upper
+    one covers.
     """
     x = patch.x
-    sigma = patch.pressure.sigma_n
-    if not _acts_on_resultant(model):
-        return np.stack([x, sigma / shear.mean_loaded_pressure(patch)])
-    passed = np.append(0.0, np.cumsum((sigma[1:] + sigma[:-1]) * np.diff(x)))
-    passed /= passed[-1]
+    keys = surface.keys
+    pressures = [patch.pressure.sigma_n]
+    if surface.limits is not None:
+        pressures = [averaged_law.find_tractions(keys, patch, sign) for sign in (1.0, -1.0)]
+    if surface.soft is not None or not law_has_trait(keys.law, "memoryless"):
+        mean = shear.mean_loaded_pressure(patch)
+        tables = tuple(np.stack([x, sigma / mean]) for sigma in pressures)
+        return contacts.LowerPressure(x, mean * patch.pieces.interface.weight, tables)
+
+    tables = []
+    load = surface.force.sum()
     slides = np.append(x - x[-1], x[1:] - x[0])
-    return np.stack([slides, np.append(passed, 1 - passed[1:])])
+    for sigma in pressures:
+        passed = np.append(0.0, np.cumsum((sigma[1:] + sigma[:-1]) * np.diff(x)))
+        scale = passed[-1] if len(pressures) == 1 else 2 * load / patch.pieces.interface.width
+        tables.append(np.stack([slides, np.append(passed, passed[-1] - passed[1:]) / scale]))
+    return contacts.LowerPressure(np.zeros(1), np.array([load]), tuple(tables))
 
 
 def make_points(
@@ -232,8 +231,7 @@ def make_points(
     """
     keys = surface.keys
     if law_has_trait(keys.law, "bonds"):
-        min_rest_speed = 0.0 if model.rig is None else MIN_RIG_REST_SPEED
-        law = make_bond_parameters(keys, model.speed_scale, min_rest_speed)
+        law = _make_bonds(model, keys)
     else:
         law = friction.record.make_law(keys, surface.total)
 
@@ -242,7 +240,11 @@ def make_points(
     if surface.soft is None:
         has_nodes = moves or surface.lower is not None
         if not has_nodes or law_has_trait(keys.law, "memoryless"):
-            return _make_point_set(surface, _make_law_points(surface, law, force.sum()))
+            nodes = None
+            if surface.limits is not None:
+                surface = surface._replace(limits=surface.limits.sum(axis=1, keepdims=True))
+                nodes = 3 * force.size + np.array([[0], [1]]) if moves else None
+            return _make_point_set(surface, _make_law_points(surface, law, force.sum()), nodes)
         nodes = np.arange(force.size)
         return _make_point_set(
             surface, _make_law_points(surface, law, force), nodes if moves else None
@@ -255,8 +257,12 @@ def make_points(
     if keys.law in laws.STIFF_LAWS:
         diagonal = surface.soft.slip_compliance.diagonal()[modes.points]
         modes, own = shear_modes.share_rest(modes, diagonal)
+    nodes = modes.points
+    if surface.limits is not None:
+        surface = surface._replace(limits=surface.limits[:, modes.points])
+        nodes = modes.points + force.size * np.array([[1], [2]])
     point_law = _make_law_points(surface, law, force[modes.points], own)
-    return _make_point_set(surface, point_law, modes.points if moves else None, modes)
+    return _make_point_set(surface, point_law, nodes if moves else None, modes)
 
 
 def _choose_modes(model, surface: Surface, law, n_modes: int | None, *, moves: bool):
@@ -329,8 +335,8 @@ def find_steepest_fall(law) -> float:
     if law.order != 1 or law.reading != "stretch":
         bond_sum = contacts.BondSum(law, np.inf, 0.0)
         point_law = laws.make_list(law, 1.0)
-    point_sets = [contacts.PointSet(point_law, np.zeros(0))]
-    contact = join_points(point_sets, law.static, bond_sum, {})
+    point_sets = [contacts.PointSet(point_law, np.zeros(0), bond_sum=bond_sum)]
+    contact = join_points(point_sets, law.static, {})
     force = time_steps.slides.follow(contact, time, slide).force / law.static
     return max(0.0, float(-(np.diff(force) / np.diff(slide)).min()))
 
@@ -349,21 +355,15 @@ def _make_point_set(surface: Surface, law, nodes=None, modes=None) -> contacts.P
     modes : ShearModes, optional
         Shear of the pieces.
     """
-    point_set = contacts.PointSet(law, surface.row, nodes, modes)
+    point_set = contacts.PointSet(law, surface.row, nodes, modes, bond_sum=surface.bond_sum)
     if surface.lower is None:
         return point_set
-    x, shares = surface.lower
+    lower = surface.lower
     if modes is not None:
-        x = x[modes.points]
-        shares = shares[modes.points]
-    below = {
-        "nodes": np.full(x.size, time_steps.march_rows_kernels.LOWER),
-        "shares": shares,
-        "places": x,
-    }
+        lower = lower._replace(places=lower.places[modes.points], shares=lower.shares[modes.points])
     if surface.bond_sum is None:
         law = laws.keep_loads(law)
-    return replace(point_set, law=law, **below)
+    return replace(point_set, law=law, lower=lower)
 
 
 def _make_law_points(surface: Surface, law, mean, compliance=0.0) -> laws.PointLaw:
@@ -393,7 +393,10 @@ def _make_law_points(surface: Surface, law, mean, compliance=0.0) -> laws.PointL
         n_cells = laws.N_CELLS * (CELLS_FACTOR if is_cheap else 1)
         n_cells = n_cells // 2 if surface.has_half_cells else n_cells
         return laws.make_iwan(law, np.maximum(load, MIN_LOAD), n_cells)
-    return laws.make_point_law(keys.law, law, load, compliance)
+    if surface.limits is None:
+        return laws.make_point_law(keys.law, law, load, compliance)
+    forward, back = surface.rise * surface.limits
+    return laws.make_point_law(keys.law, law, forward, compliance)._replace(back=back)
 
 
 def _find_length(point_sets) -> float:

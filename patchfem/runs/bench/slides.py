@@ -156,7 +156,7 @@ def _follow_without_memory(task: SlideTask) -> SlideHistories:
     frames = task.frames
     if _averages_pressure(task):
         offsets = slide[frames] * (model.side == "lower")
-        tau = averaged_law.distribute_slip_force(model, task.patch, force[frames], offsets)
+        tau = averaged_law.distribute_slip_force(model.friction, task.patch, force[frames], offsets)
     else:
         ratio = np.divide(force, load, out=np.zeros_like(force), where=load > 0)
         tau = ratio[frames, None] * task.evaluate_pressure(frames)
@@ -203,7 +203,9 @@ def _find_limits(task: SlideTask, load, direction: float) -> np.ndarray:
     offsets = task.slide if task.model.side == "lower" else np.zeros(1)
     limits = []
     for offset in offsets:
-        traction = averaged_law.find_tractions(task.model, task.patch, direction, float(offset))
+        traction = averaged_law.find_tractions(
+            task.model.friction, task.patch, direction, float(offset)
+        )
         limits.append(coefficient * float(traction @ task.weight))
     return np.broadcast_to(limits, load.shape)
 
@@ -251,15 +253,17 @@ def _climb_grooves(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
     friction = task.model.friction
     moves = np.diff(slide)
     if law_has_trait(friction.law, "set-valued"):
-        kinetic = _find_coefficient(task)
+        back, forward = (_find_limits(task, load, sign) / load for sign in (-1.0, 1.0))
         # Index of the last step in which the interface moved, up to each step; -1 before the first one.
         last = np.maximum.accumulate(np.where(moves != 0, np.arange(moves.size), -1))
         direction = np.append(0.0, np.where(last < 0, 0.0, np.sign(moves)[last]))
-        ratio = grooves.force_ratio(slide, direction, kinetic)
+        ratio = grooves.force_ratio(slide, direction, np.where(direction < 0, back, forward))
         # Before the motion starts, the friction on the flank balances the load as far as its limit allows.
         lowest, highest = grooves.force_ratio(slide[0], np.array([-1.0, 1.0]), friction.static)
         ratio[direction == 0] = np.clip(0.0, lowest, highest)
-        return load * ratio, load[1:] * grooves.friction_loss(slide[:-1], slide[1:], kinetic)
+        # The load is constant, and so are both coefficients.
+        losses = [grooves.friction_loss(slide[:-1], slide[1:], part[0]) for part in (back, forward)]
+        return load * ratio, load[1:] * np.where(moves < 0, *losses)
 
     durations = np.diff(task.time)
     speed = np.divide(moves, durations, out=np.zeros_like(moves), where=durations > 0)
@@ -384,7 +388,7 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
             contact = replace(contact, load=partial(np.interp, xp=time, fp=load))
 
     # A long bond list is stopped by its guard before it takes too long.
-    report = task.progress if contact.bond_sum is None else BondListGuard(task.progress)
+    report = BondListGuard(task.progress) if contact.has_lists else task.progress
     motion = time_steps.slides.follow(contact, time, task.slide, task.frames, task.say, report)
     if motion.n_unsolved:
         raise NotConverged(
@@ -396,7 +400,7 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     # Shear stress and local slip of the frames, by what represents the shear of the pieces.
     local_slip = motion.slip
     frames = task.frames
-    if contact.point_sets[0].shear is not None or contact.pressure is not None:
+    if contact.point_sets[0].shear is not None or contact.point_sets[0].lower is not None:
         tau, local = shear.compute_point_fields(patch, contact, motion.snapshots)
     else:
         tau, local = _distribute_evenly(task, motion.force, local_slip)

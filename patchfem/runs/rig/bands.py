@@ -17,11 +17,14 @@ def number_bands(patch) -> np.ndarray:
     return np.clip((place * N_YAW_BANDS).astype(int), 0, N_YAW_BANDS - 1)
 
 
+def sum_bands(patch, values) -> np.ndarray:
+    """Return the sums (b,) of values (m,) of the cells of a face over each band."""
+    return np.bincount(number_bands(patch), values, N_YAW_BANDS)
+
+
 def compute_band_loads(patch) -> np.ndarray:
     """Sum the normal forces of the cells in each band of a face: the loads (b,) [N] of the bands."""
-    return np.bincount(
-        number_bands(patch), patch.normal_stress * patch.pieces.interface.weight, N_YAW_BANDS
-    )
+    return sum_bands(patch, patch.normal_stress * patch.pieces.interface.weight)
 
 
 def average_over_bands(run, patch):

@@ -3,17 +3,19 @@
 In: a Model and its Numerics. Out: the EngineChoice of the bond summation (`choose_bond_summation`),
 """
 
+from dataclasses import replace
 from functools import lru_cache
 from math import ceil, inf, pi, sqrt
 
 import numpy as np
 
 from ...core import Missing
-from ...effects import law_has_trait, needs_bond_list
+from ...effects import law_has_trait
 from ...friction.bonds import engines
 from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ..bench import engine as bench_engine
+from ..bench.contact_points import sums_over_lists
 from .numerics import Numerics
 
 # Ratio of the stroke that bond summation has to resolve to the first stroke of a released motion.
@@ -36,39 +38,50 @@ def choose_bond_summation(model: Model, numerics: Numerics):
     path between two reversals of the motion. It is four times the amplitude that follows from the speed scale and the
     frequency of the drive, or from the stiffness of the bonds if they hold the block. If the motion decays (release,
     step), the stroke is reduced to DECAYED_STROKE_RATIO, because a list of all bonds would need too much memory. For a
-    block held by the law as printed in the 1985 report it is reduced to STICKING_STROKE_RATIO.
+    block held by the law as printed in the 1985 report it is reduced to STICKING_STROKE_RATIO. Of several interfaces, the
+    narrowest strips serve all lists.
     """
     if numerics.choice is not None:
         return numerics.choice
-    requested = bench_engine.find_requested_engine(model)
-    if requested in ("auto", "recursion") and not needs_bond_list(model.friction):
-        return engines.RECURSION
-    stretch = _estimate_held_displacement(model)
-    return _choose_summation_for_engine(model, numerics, stretch, requested)
+    choices = []
+    for number, part in enumerate(_list_parts(model)):
+        if sums_over_lists(part):
+            choices.append(_choose_summation(part, numerics, number))
+    return min(choices, key=lambda choice: choice.merge, default=engines.RECURSION)
+
+
+def _list_parts(model: Model) -> list[Model]:
+    """Return a model with the law and the load of each interface, or the model itself if it has only one."""
+    interfaces = model.rig.friction.interfaces
+    if len(interfaces) < 2:
+        return [model]
+    return [
+        replace(model, friction=interface.numbers, point=replace(model.point, load=interface.load))
+        for interface in interfaces
+    ]
 
 
 def has_bond_list(model: Model, numerics: Numerics) -> bool:
-    """Return whether a law with bonds needs a list of all bonds that have formed, over which its force is summed."""
-    f = model.friction
-    return (
-        f is not None
-        and law_has_trait(f.law, "bonds")
-        and choose_bond_summation(model, numerics).engine != "recursion"
-    )
+    """Return whether an interface needs a list of all bonds that have formed, over which its force is summed."""
+    if model.friction is None:
+        return False
+    return choose_bond_summation(model, numerics).engine != "recursion"
 
 
-def _choose_summation_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
-    """Return how the bonds are summed, as a `friction.bonds.engines.EngineChoice`.
+def _choose_summation(model: Model, numerics: Numerics, number: int):
+    """Return how the bonds of interface `number` are summed, as a `friction.bonds.engines.EngineChoice`.
 
-    `engine` is the requested form of the sum, such as "recursion", or "auto" for the cheapest one within the tolerance.
     The error of a summation depends on the stroke between two reversals: 4 times the displacement amplitude of the drive,
-    but at most that of a block held by its bonds (`stretch`), both in bond lengths. `numerics` has the steps per cycle.
+    but at most that of a block held by its bonds, both in bond lengths. `model` has the law of the interface, and
+    `numerics` the steps per cycle.
     """
+    engine = bench_engine.find_requested_engine(model)
+    stretch = _estimate_held_displacement(model, number)
     law = model.bonds
     accuracy = model.accuracy
     drive = model.rig.drive
     ratio = 1.0
-    if is_stuck_by_printed_law(model):
+    if is_stuck_by_printed_law(model, number):
         ratio = STICKING_STROKE_RATIO
     elif drive.kind == "free" or drive.waveform.is_step:
         ratio = DECAYED_STROKE_RATIO
@@ -79,7 +92,7 @@ def _choose_summation_for_engine(model: Model, numerics: Numerics, stretch: floa
     return engines.choose_engine(law, accuracy.tolerance, stroke, numerics.steps / 2, requested)
 
 
-def _estimate_held_displacement(model: Model) -> float:
+def _estimate_held_displacement(model: Model, number: int) -> float:
     """Return the displacement, in bond lengths, of a driven block that sticks on its bonds.
 
     The stiffness of the bonds is mu_s N/eps_0. The result is inf if the friction limit is below
@@ -88,19 +101,19 @@ def _estimate_held_displacement(model: Model) -> float:
     f = model.friction
     if f.reading == "report" or model.rig.drive.kind == "free":
         return inf
-    ratio = _find_holding_ratio(model)
+    ratio = _find_holding_ratio(model, number)
     return 1 / ratio if ratio >= MIN_STUCK_FORCE_RATIO else inf
 
 
-def _find_holding_ratio(model: Model) -> float:
-    """Return the friction limit over the force that holds the block at rest."""
+def _find_holding_ratio(model: Model, number: int) -> float:
+    """Return the friction limit of interface `number` of a model over the force that holds it at rest."""
     limit = model.friction.static * model.nominal_load
-    holding_force = compute_holding_force(model.rig)
+    holding_force = compute_holding_force(model.rig, number)
     return limit / holding_force if holding_force else inf
 
 
-def is_stuck_by_printed_law(model: Model) -> bool:
-    """Return whether the friction law as printed in the report holds a driven block at rest.
+def is_stuck_by_printed_law(model: Model, number: int = 0) -> bool:
+    """Return whether the friction law of a `model` as printed in the report holds interface `number` at rest.
 
     The block then reverses in almost every step, and each reversal adds a strip to its list.
     """
@@ -109,12 +122,12 @@ def is_stuck_by_printed_law(model: Model) -> bool:
         and model.friction is not None
         and law_has_trait(model.friction.law, "bonds")
         and model.friction.reading == "report"
-        and _find_holding_ratio(model) >= MIN_STUCK_FORCE_RATIO
+        and _find_holding_ratio(model, number) >= MIN_STUCK_FORCE_RATIO
     )
 
 
-def compute_holding_force(rig) -> float:
-    """Return the peak force [N] on the first interface that holds all interfaces at rest.
+def compute_holding_force(rig, number: int = 0) -> float:
+    """Return the peak force [N] on interface `number` of a rig when all interfaces are held at rest.
 
     For a single mode it is mass times acceleration times the ratio of base to slide participation,
     at any frequency. Several modes continue to vibrate while the interfaces stick, and add inertia
@@ -135,7 +148,9 @@ def compute_holding_force(rig) -> float:
     )
     push = modes.base * find_max_acceleration(rig.drive.signal)
     try:
-        return float(abs(np.linalg.solve(whole, np.append(push, np.zeros(len(interfaces))))[n]))
+        return float(
+            abs(np.linalg.solve(whole, np.append(push, np.zeros(len(interfaces))))[n + number])
+        )
     except np.linalg.LinAlgError:
         return inf
 
@@ -149,11 +164,16 @@ def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
     """
     if not has_bond_list(model, numerics) or model.partial_slip:
         return
-    f = model.friction
     modes = model.rig.modes
     drive = model.rig.drive.signal
-    mobility = float((modes.slide**2).sum()) / modes.mass
-    omega = sqrt(f.static * model.nominal_load / f.bond_length * mobility)
+    omega = 0.0
+    for part, interface, row in zip(
+        _list_parts(model), model.rig.friction.interfaces, modes.interfaces
+    ):
+        if sums_over_lists(part) and not interface.partial_slip:
+            f = part.friction
+            mobility = float((row**2).sum()) / modes.mass
+            omega = max(omega, sqrt(f.static * part.nominal_load / f.bond_length * mobility))
     phase = omega * drive.period / numerics.steps
     if phase > MAX_BOND_VIBRATION_PHASE:
         wanted = ceil(omega * drive.period)

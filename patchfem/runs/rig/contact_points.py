@@ -10,10 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from ...contact import contact_sets
+from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega
 from ...time_steps import laws
 from ...time_steps.contacts import PointSet
+from ..bench import averaged_law
 from ..bench.contact_points import (
     Surface,
     find_load_fields,
@@ -40,9 +42,6 @@ def make_contact(model: Model, numerics, patch):
     """
     rig = model.rig
     rows = rig.modes.interfaces
-    bond_sum = None
-    if bond_lists.has_bond_list(model, numerics):
-        bond_sum = make_bond_sum(model, bond_lists.choose_bond_summation(model, numerics))
     springs = []
     if rig.springs.interlock is not None:
         law = laws.make_interlocking(*rig.springs.interlock)
@@ -61,8 +60,14 @@ def make_contact(model: Model, numerics, patch):
             fields["elements"] = found[0].reduction
         if not sets:
             surfaces = _list_surfaces(model, numerics, patch)
-            how = {"has_half_cells": numerics.has_half_cells, "bond_sum": bond_sum}
-            surfaces = [part._replace(**how) for part in surfaces]
+            choice = bond_lists.choose_bond_summation(model, numerics)
+            surfaces = [
+                part._replace(
+                    has_half_cells=numerics.has_half_cells,
+                    bond_sum=make_bond_sum(model, part.keys, choice),
+                )
+                for part in surfaces
+            ]
             moves = "sets" in fields
             count = numerics.shear_modes
             sets = [make_points(model, part, count, moves=moves) for part in surfaces]
@@ -71,7 +76,7 @@ def make_contact(model: Model, numerics, patch):
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     if model.grooves is not None:
         limit = model.grooves.max_force(fields["preload"], model.friction.static)
-    return join_points([*sets, *springs], limit or scale, bond_sum, fields)
+    return join_points([*sets, *springs], limit or scale, fields)
 
 
 def _find_load(model: Model, patch) -> dict:
@@ -94,12 +99,16 @@ def _find_load(model: Model, patch) -> dict:
         "heave": still if modes.normal is None else np.asarray(modes.normal, float),
         "pitch": still if modes.pitch is None else np.asarray(modes.pitch, float),
         "preload": float(force.sum()),
+        "averages": averaged_law.make_averages(model.friction, patch),
     }
 
 
 def _list_element_joints(model: Model, numerics, patch) -> list[joints.Joint]:
     """Return the interfaces as joints of parallel elements where all that slip part by part have them; [] elsewhere."""
     interfaces = model.rig.friction.interfaces
+    patches = [model.patch, *(interface.patch for interface in interfaces)]
+    if any(part is not None and part.gap.side == "lower" for part in patches):
+        return []
     is_soft = [model.partial_slip or interface.partial_slip for interface in interfaces]
     keys = [model.friction if patch is not None else interface.numbers for interface in interfaces]
     soft_keys = [law for law, soft in zip(keys, is_soft) if soft]
@@ -113,25 +122,40 @@ def _list_surfaces(model: Model, numerics, patch) -> list[Surface]:
     rig = model.rig
     rows = rig.modes.interfaces
     if patch is not None:
-        keys = joints.replace_averaged_law(model.friction, model, patch)
+        keys = model.friction
+        limits = averaged_law.find_loads(keys, patch)
         total = float(patch.pressure.load)
         force = patch.pressure.sigma_n * patch.pieces.interface.weight
         soft = patch if model.partial_slip else None
         if rig.friction.bands_slide_apart and not model.partial_slip:
             pairs = zip(bands.compute_band_loads(patch), rows)
-            return [Surface(keys, total, np.array([load]), None, row) for load, row in pairs]
-        return [place_surface(model, patch, Surface(keys, total, force, soft, rows[0]))]
+            parts = [Surface(keys, total, np.array([load]), None, row) for load, row in pairs]
+            if limits is not None:
+                sums = [bands.sum_bands(patch, loads) for loads in limits]
+                parts = [
+                    part._replace(limits=np.reshape(pair, (2, 1)))
+                    for part, *pair in zip(parts, *sums)
+                ]
+            return parts
+        surface = Surface(keys, total, force, soft, rows[0], limits=limits)
+        return [place_surface(model, patch, surface)]
 
     surfaces = []
     for k, interface in enumerate(rig.friction.interfaces):
         load = model.point.load if interface.load is None else interface.load
         force = np.array([load])
+        keys = interface.numbers
         own = None
-        if interface.partial_slip:
+        if interface.patch is not None and (
+            interface.partial_slip
+            or interface.patch.gap.side == "lower"
+            or law_has_trait(keys.law, "averaged")
+        ):
             solved = faces.solve_contact_on_meshes(interface, model.accuracy.tolerance)
             own = solved[int(k in numerics.meshed)]
             force = own.pressure.sigma_n * own.pieces.interface.weight
-        keys = joints.replace_averaged_law(interface.numbers, model, patch)
-        surface = Surface(keys, load, force, own, rows[k])
-        surfaces.append(place_surface(model, None, surface))
+        limits = averaged_law.find_loads(keys, own)
+        soft = own if interface.partial_slip else None
+        surface = Surface(keys, load, force, soft, rows[k], limits=limits)
+        surfaces.append(place_surface(model, own, surface))
     return surfaces

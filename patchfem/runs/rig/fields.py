@@ -76,7 +76,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         force = list_frames("force")
         tau = np.outer(force / patch.pressure.load, sigma)
         if f is not None and law_has_trait(f.law, "averaged"):
-            tau = averaged_law.distribute_slip_force(model, patch, force, np.zeros(force.size))
+            tau = averaged_law.distribute_slip_force(f, patch, force, np.zeros(force.size))
         local = np.repeat(list_frames("slip")[:, None], sigma.size, axis=1)
     return make_interface_frames(patch, list_frames("time"), tau, local, list_frames("slide"), rule)
 

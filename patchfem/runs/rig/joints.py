@@ -143,7 +143,7 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     if not friction.interfaces:
         return []
     if patch is not None:
-        law = replace_averaged_law(model.friction, model, patch)
+        law = replace_averaged_law(model.friction, patch)
         contact_load = float(patch.pressure.load)
         parts = _list_patch_parts(model, patch)
         return [Joint(law, load, speed, contact_load, *elements) for load, elements in parts]
@@ -155,7 +155,7 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         parts = ()
         if interface.partial_slip and has_elements(interface.numbers):
             parts = faces.make_patch_elements(interface, model.accuracy.tolerance, k in meshed)
-        law = replace_averaged_law(interface.numbers, model, patch)
+        law = replace_averaged_law(interface.numbers, None)
         joints.append(Joint(law, load, speed, load.mean, *parts))
     return joints
 
@@ -165,7 +165,7 @@ def has_elements(law) -> bool:
     return law_supports(law, "pieces") and law_supports(law, "shear")
 
 
-def replace_averaged_law(law, model: Model, patch):
+def replace_averaged_law(law, patch):
     """Return Coulomb's law in place of a law that averages the pressure; other laws are unchanged.
 
     On a rigid block the sum of the friction limits of all nodes is a constant fraction of the load, which replaces the
@@ -175,8 +175,6 @@ def replace_averaged_law(law, model: Model, patch):
     ----------
     law : Friction
         Effective keys of the friction law.
-    model : Model
-        Rig with the patch.
     patch : Patch or None
         Solved patch with the pressure; None for a single point.
 
@@ -187,7 +185,7 @@ def replace_averaged_law(law, model: Model, patch):
     """
     if not law_has_trait(law.law, "averaged"):
         return law
-    static = law.static * averaged_law.slip_force_ratio(model, patch)
+    static = law.static * averaged_law.slip_force_ratio(law, patch)
     return law.model_copy(update={"law": "coulomb", "static": static, "kinetic": static})
 
 
@@ -238,7 +236,7 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     joints = list_joints(model, patch, numerics.meshed)
     laws = []
     for joint in joints:
-        law = joint.make_hybrid_law() if model.grooves is None else _make_groove_law(model)
+        law = joint.make_hybrid_law() if model.grooves is None else _make_groove_law(model, joint)
         if joint.stiffness is not None and rig.drive.kind == "free":
             # Decay curves are measured at the extremes of the output.
             law = with_all_reversals(law)
@@ -253,12 +251,12 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     )
 
 
-def _make_groove_law(model: Model) -> LawNumbers:
-    """Return the law of the only interface, whose grooves lift the load along their flanks when it slides."""
+def _make_groove_law(model: Model, joint: Joint) -> LawNumbers:
+    """Return the law of the only interface (`joint`), whose grooves lift the load along their flanks when it slides."""
     slide = model.rig.modes.slide
     mass = model.rig.modes.mass / float(slide @ slide)
     model.grooves.check_lifted_mass(model.friction.static, mass)
-    return make_grooves(model.friction, model.grooves)
+    return make_grooves(joint.law, model.grooves)
 
 
 def _find_spring_stiffness(law: LawNumbers) -> float:

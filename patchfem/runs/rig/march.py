@@ -111,8 +111,8 @@ class MarchEvaluator(RunEvaluator):
 
     def collect_solution_fields(self, run, drive) -> Fields:
         """Return {"bond_summation": method by which the bonds were summed}, or {} for a law without bonds."""
-        friction = self.model.friction
-        if friction is None or not law_has_trait(friction.law, "bonds"):
+        interfaces = self.model.rig.friction.interfaces
+        if not any(law_has_trait(interface.numbers.law, "bonds") for interface in interfaces):
             return {}
         return {"bond_summation": choose_bond_summation(self.model, self.numerics)}
 

@@ -69,9 +69,11 @@ def _check_bonds(law: TableFacts, unused: list[str]) -> None:
     if is_wrong:
         law.add_mistake("order", f"must be {needed}, not {law.order}")
 
-    is_spread_of_point = law.table_key == "friction" and law.draft.tables.normal is not None
-    if law.spread and law_takes_key(law.table.law, "spread") and is_spread_of_point:
-        if not law.draft.has("normal.width"):
+    # A spread needs the width of the pad.
+    if law.spread and law_takes_key(law.table.law, "spread"):
+        if law.table_key != "friction" and not law.contact:
+            law.add_missing("contact", "spread needs the width of a patch")
+        elif law.table_key == "friction" and law.scene.normal and not law.draft.has("normal.width"):
             law.draft.add_missing("normal.width", "friction.spread needs this key")
 
 

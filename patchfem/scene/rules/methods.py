@@ -25,10 +25,12 @@ class Joint(NamedTuple):
 
     - law: table of its friction law.
     - compliance: key of the compliance that allows partial slip; "" if the patch slips as a whole.
+    - is_uneven: whether the friction limits of an averaged pressure may differ in both directions, or between bands.
     """
 
     law: Friction
     compliance: str
+    is_uneven: bool = False
 
 
 class MotionFeatures(NamedTuple):
@@ -151,7 +153,7 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
         elif support.law == "march":
             is_supported = has_return_map(joint.law)
         elif support.law == "exact":
-            is_supported &= is_rigid
+            is_supported &= is_rigid and not joint.is_uneven
         elif support.law == "pieces" and is_rigid:
             is_supported &= not law_has_trait(joint.law.law, "set-valued")
         elif support.law == "pieces":
@@ -174,14 +176,14 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     """
     law = joint.law.law
     if motion.grooves:
-        return law_has_trait(law, "memoryless") and not joint.compliance
+        return law_has_trait(law, "memoryless") and not (joint.compliance or joint.is_uneven)
     if joint.compliance:
         return _has_elements(joint)
     if motion.load_change:
         # Regimes of the elastic-plastic law have springs that come and go with the load.
         is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)
         return law in VARYING_LAWS and not is_fixed
-    return not (needs_bond_list(joint.law) or motion.lower_shape)
+    return not (needs_bond_list(joint.law) or motion.lower_shape or joint.is_uneven)
 
 
 def check_accuracy_method(draft: SceneDraft, kind: str) -> None:
@@ -218,8 +220,13 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     laws = [law for law in tables_of_laws if law is not None and law.law is not None]
     load_change = find_load_change_key(tables) if laws else ""
     lower = list_lower_shapes(tables.contact)
+    for number, interface in enumerate(scene.structure.interface):
+        patch_key = f"structure.interface.{number}.contact"
+        lower += list_lower_shapes(interface.table.contact, patch_key)
     return MotionFeatures(
-        joints=[Joint(law, find_compliance_key(law, tables)) for law in laws],
+        joints=[
+            Joint(law, find_compliance_key(law, tables), _is_uneven(law, tables)) for law in laws
+        ],
         load_change=load_change and f"with {describe_load_change(load_change)}",
         bands_yaw=bool(scene.contact.area and find_yaw_key(tables)),
         spring=find_nonlinear_spring(tables),
@@ -231,9 +238,20 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
 
 
 def find_compliance_key(law: Friction, tables: Tables) -> str:
-    """Return the key in the tables that allows partial slip under a law, or "" if there is none."""
+    """Return the key in the tables that allows partial slip under a law, or "" if there is none or nothing rubs."""
+    if law is not None and law.static == 0:
+        return ""
     owner = law if isinstance(law, Interface) else tables.contact
     return owner.compliance_key if owner is not None else ""
+
+
+def _is_uneven(law: Friction, tables: Tables) -> bool:
+    """Return whether a law in the tables averages a pressure that may not be even along x, or not alike on all bands."""
+    contact = law.contact if isinstance(law, Interface) else tables.contact
+    if contact is None or not law_has_trait(law.law, "averaged"):
+        return False
+    is_shaped = bool(set(contact.shapes) - {"crown"} or contact.load_line or contact.mesh)
+    return is_shaped or isinstance(law, Interface) or bool(find_yaw_key(tables))
 
 
 def list_lower_shapes(contact: Contact | None, table_key: str = "contact") -> list[str]:

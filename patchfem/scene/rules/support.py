@@ -17,15 +17,11 @@ from typing import Any, NamedTuple
 
 from ...effects import (
     LAWS,
-    describe_law,
     describe_unsupported,
     find_waveform,
     law_has_trait,
     law_supports,
-    law_takes_key,
     law_takes_stiffness_or_length,
-    needs_bond_list,
-    suggest_laws,
 )
 from ..keys.contact import Contact
 from ..keys.tables import Friction
@@ -115,21 +111,6 @@ class Joint(TableFacts):
         """Return whether the law is known and does not support all of some features, such as "pieces"."""
         return self.law in LAWS and not self.supports(*words)
 
-    @property
-    def law_description(self) -> str:
-        """Friction law as text, with its `reading` or `order` if that requires the sum over all bonds."""
-        return describe_law(self.table)
-
-    @property
-    def joints_advice(self) -> str:
-        """Advice on a friction law that does not support several interfaces."""
-        return suggest_laws("joints", friction=self.table)
-
-    @property
-    def needs_list(self) -> bool:
-        """Whether the law is a sum over all bonds."""
-        return self.has_trait("bonds") and needs_bond_list(self.table)
-
     @cached_property
     def lower_shape(self) -> str:
         """Key of the first shape on the lower piece; "" if there is none, or if shapes lie on both pieces."""
@@ -193,15 +174,7 @@ class Feature(NamedTuple):
     words: str = ""
 
 
-# Features that only the friction law has, with a function of the joint that tells whether it has them.
-LAW_FEATURES = {
-    "law for one interface": lambda j: j.lacks("joints"),
-    "law of an averaged pressure": lambda j: j.has_trait("averaged"),
-}
 JOINT_FEATURES = {
-    name: Feature(is_there, "{table_key}.law", "{law_description}")
-    for name, is_there in LAW_FEATURES.items()
-} | {
     # kinds of scenes and drives
     "bench": Feature(lambda j: j.kind == "bench"),
     "rig": Feature(lambda j: j.kind == "rig"),
@@ -226,7 +199,7 @@ JOINT_FEATURES = {
     "changing load": Feature(
         lambda j: j.kind == "rig" and j.load_change, "{load_change}", "{load_change_description}"
     ),
-    # the law; LAW_FEATURES has more
+    # the law
     "memory of the slip": Feature(
         lambda j: not j.has_trait("memoryless") or j.compliance,
         "",
@@ -237,12 +210,8 @@ JOINT_FEATURES = {
         "{table_key}.kinetic",
         "{kinetic:g} below static = {static:g}",
     ),
-    "no friction": Feature(lambda j: j.static == 0, "{table_key}.static", "static = 0"),
     "bonds of a given stiffness": Feature(
         lambda j: j.stiffness and law_takes_stiffness_or_length(j.law), "{table_key}.stiffness"
-    ),
-    "spread of the bonds": Feature(
-        lambda j: j.spread and law_takes_key(j.law, "spread"), "{table_key}.spread"
     ),
     "bonds that no force can move": Feature(
         lambda j: j.has_unbounded_bonds,

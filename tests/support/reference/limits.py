@@ -124,7 +124,6 @@ infinite; any computed value of this peak would depend on the mesh.
 ADVICE = {  # Property of a joint in the advice of a row -> its meaning.
     "{compliance}": "what lets the patch slip part by part",
     "{heave_key}": "the heave and the pitch of the modes",
-    "{joints_advice}": "use a law that supports several interfaces",
 }
 SHAPES = [
     f"`{header.replace('contact', 'patch')}`"
