@@ -39,11 +39,11 @@ def pack_portable_codes(codes: dict[str, bytes], kernel_hash: str, versions: str
     versions : str
         Versions of what made the code, on which its text depends.
     """
-    from patchfem.compiled.machine import join_file
+    from patchfem.compiled import machine
 
     sizes = {name: len(codes[name]) for name in sorted(codes)}
     header = {"kernels": kernel_hash, "versions": versions, "sizes": sizes}
-    return join_file(header, b"".join(codes[name] for name in sizes))
+    return machine.join_file(header, b"".join(codes[name] for name in sizes))
 
 
 def make_portable_codes() -> tuple[str, dict[str, bytes]]:
