@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
+import portable_code
 import pytest
 from limits import limit_file_size
 from scene_texts import PLASTIC, POINT, TRIANGLE
@@ -38,9 +39,10 @@ print(json.dumps({"work": result.measures["loop_area"].value,
                   "not stored": [one.name for one in kernels if not all(one.loaded_functions.values())]}))
 if len(sys.argv) > 2:
     from patchfem import compiled
-    from patchfem.compiled import machine, portable
+    from patchfem.compiled import machine
+    from portable_code import pack_portable_codes
     kernels = compiled.hash_kernels()
-    packed = portable.pack_portable_codes(machine.PORTABLE_CODES, kernels, "of this process")
+    packed = pack_portable_codes(machine.PORTABLE_CODES, kernels, "of this process")
     with open(sys.argv[2], "wb") as file:
         file.write(lzma.compress(packed))
 """
@@ -61,7 +63,8 @@ def run_slide(home: Path, cache: Path, *arguments: str) -> dict:
 
     With an argument, a path, it writes the functions that it compiled as portable code.
     """
-    environment = os.environ | {"PYTHONPATH": str(home), "PATCHFEM_CACHE": str(cache)}
+    path = f"{home}{os.pathsep}{Path(portable_code.__file__).parent}"
+    environment = os.environ | {"PYTHONPATH": path, "PATCHFEM_CACHE": str(cache)}
     environment.pop("NUMBA_CACHE_DIR", None)
     done = subprocess.run(
         [sys.executable, "-c", BENCH, SCENE, *arguments],
@@ -157,7 +160,7 @@ def test_exact_portable_code_needs_no_numba(tmp_path, shared_cache, parallel_res
 def test_exact_unfit_portable_code_is_ignored(tmp_path, monkeypatch, harm):
     """Portable code that is damaged or made for other kernels, and any if indices are checked, is ignored."""
     kernels = "of others" if harm == "other kernels" else compiled.hash_kernels()
-    content = portable.pack_portable_codes({"b": b"second", "a": b"first"}, kernels, "any")
+    content = portable_code.pack_portable_codes({"b": b"second", "a": b"first"}, kernels, "any")
     data = bytearray(lzma.compress(b"[]\n" if harm == "no header" else content))
     changed = data.copy()
     changed[len(data) // 2] ^= 1

@@ -7,7 +7,6 @@ optimises each function that Python calls once, with all that it calls.
 """
 
 from contextlib import suppress
-from functools import wraps
 from types import SimpleNamespace
 
 import numba
@@ -17,7 +16,6 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
 from numba.core.compiler_machinery import PassManager
 from numba.core.registry import CPUDispatcher
-from numba.core.types.functions import BaseFunction
 
 from .. import compiled
 from .integer_enums import register_integer_enums
@@ -78,47 +76,6 @@ def njit(cache: bool = False, **options):
         return lambda function: store_on_disk(numba.njit(**NO_C_WRAPPER, **options)(function))
     options = {"nopython": True, "boundscheck": None, **options}
     return lambda function: InlinedDispatcher(function, {}, options, UnoptimisedCompiler)
-
-
-def _memoize_call_types(method):
-    """Memoize the method `get_call_type`, by which numba resolves a call of a built-in function.
-
-    Numba tries all overloads of the function, some dozens for a sum of two numbers, at each of the 4000 calls of a
-    loop, which took a seventh of its compile time. A signature that depends on more than the types of the arguments is
-    not stored: that of an overload written in Python, which numba compiles with the flags of the caller.
-
-    `method` is the method of numba that is replaced.
-    """
-    signatures = {}
-
-    @wraps(method)
-    def get_call_type(self, context, args, kws):
-        """Return the signature of a call with arguments of these types, from the memo if it is known.
-
-        `context` is the typing context of numba, `args` and `kws` are the types of the arguments by position and by
-        name.
-        """
-        key = self, tuple(args)
-        if not kws and key in signatures:
-            # As the method does, record by which key numba finds the implementation of this signature.
-            signature = signatures[key]
-            self._impl_keys[signature.args] = self.typing_key
-            return signature
-        signature = method(self, context, args, kws)
-
-        # The key of an overload written in Python is another one than that of the function: it is not stored.
-        if (
-            not kws
-            and signature is not None
-            and self._impl_keys.get(signature.args) is self.typing_key
-        ):
-            signatures[key] = signature
-        return signature
-
-    return get_call_type
-
-
-BaseFunction.get_call_type = _memoize_call_types(BaseFunction.get_call_type)
 
 
 class InlinedDispatcher(CPUDispatcher):

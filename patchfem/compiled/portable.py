@@ -16,26 +16,9 @@ import lzma
 from functools import cache
 from pathlib import Path
 
-from .machine import join_file, split_file
+from .machine import split_file
 
 PORTABLE_PATH = Path(__file__).with_name("portable.xz")
-
-
-def pack_portable_codes(codes: dict[str, bytes], kernel_hash: str, versions: str) -> bytes:
-    """Return the content of the file, before its compression.
-
-    Parameters
-    ----------
-    codes : dict
-        Portable code with its header (`machine`) for each name of a file of machine code.
-    kernel_hash : str
-        Hash of the kernels and of their compiler.
-    versions : str
-        Versions of what made the code, on which its text depends.
-    """
-    sizes = {name: len(codes[name]) for name in sorted(codes)}
-    header = {"kernels": kernel_hash, "versions": versions, "sizes": sizes}
-    return join_file(header, b"".join(codes[name] for name in sizes))
 
 
 @cache

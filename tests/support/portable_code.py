@@ -27,6 +27,25 @@ RUNS = (
 SWEEP = TEMPLATES / "rig.toml", {"drive.acceleration": "3 g..6 g:64"}
 
 
+def pack_portable_codes(codes: dict[str, bytes], kernel_hash: str, versions: str) -> bytes:
+    """Return the content of the file, before its compression.
+
+    Parameters
+    ----------
+    codes : dict
+        Portable code with its header (`machine`) for each name of a file of machine code.
+    kernel_hash : str
+        Hash of the kernels and of their compiler.
+    versions : str
+        Versions of what made the code, on which its text depends.
+    """
+    from patchfem.compiled import machine
+
+    sizes = {name: len(codes[name]) for name in sorted(codes)}
+    header = {"kernels": kernel_hash, "versions": versions, "sizes": sizes}
+    return machine.join_file(header, b"".join(codes[name] for name in sizes))
+
+
 def make_portable_codes() -> tuple[str, dict[str, bytes]]:
     """Compile the functions in this process, and return the versions of what made them and their codes by file name."""
     with TemporaryDirectory() as cache:
@@ -57,9 +76,7 @@ def main(path: str = "") -> None:
     from patchfem import compiled
     from patchfem.compiled import portable
 
-    data = lzma.compress(
-        portable.pack_portable_codes(codes, compiled.hash_kernels(), versions), preset=9
-    )
+    data = lzma.compress(pack_portable_codes(codes, compiled.hash_kernels(), versions), preset=9)
     Path(path or portable.PORTABLE_PATH).write_bytes(data)
     print(f"{len(codes)} functions, {len(data)} bytes, made with {versions}")
 

@@ -85,7 +85,7 @@ def write_margins(p, memory, point, s, margins):
 
 
 def switch(p, memory, point, s, which):
-    """Change the regime at an event: the direction of motion, or whether the speed is above v_h.
+    """Change the regime at an event: the direction of motion, or the sign that `memory[FLAG]` has in the law.
 
     Parameters
     ----------

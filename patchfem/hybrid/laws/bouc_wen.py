@@ -4,6 +4,7 @@
 """
 
 from ..records import Friction, LawNumbers, Margin, Memory
+from .bonds import switch as switch
 
 RIGID = False
 FLAG_SIGN = -1.0
@@ -55,27 +56,6 @@ def write_margins(p, memory, point, s, margins):
     """
     margins[Margin.MOTION] = memory[Memory.DIRECTION] * point.velocity / point.speed_scale
     margins[Margin.BRANCH] = memory[Memory.FLAG] * s[0]
-
-
-def switch(p, memory, point, s, which):
-    """Change the regime at an event: the sign of the velocity, or that of z.
-
-    Parameters
-    ----------
-    p : (k,) array
-        Numbers of the law, in the order that the top of the module names.
-    memory : (l,) array
-        Row of `records.State.memory`.
-    point : Point
-        Load and motion of the interface.
-    s : (j,) array
-        States of the law, in the order that the top of the module names.
-    which : int
-        Margin that has vanished (`records.Margin`).
-    """
-    column = Memory.DIRECTION if which == Margin.MOTION else Memory.FLAG
-    memory[column] = -memory[column]
-    return False
 
 
 def from_law(law, load):

@@ -6,6 +6,7 @@ g(v) = mu_k + (mu_s - mu_k) exp(-(v/v_s)^2). Numbers: mu_s, mu_k, c [1/m], v_s [
 from math import exp
 
 from ..records import Friction, LawNumbers, Margin, Memory
+from .bonds import switch as switch
 
 RIGID = False
 MAX_RISE_SPEED = 6.0  # largest speed, relative to v_s, at which g exceeds mu_k by more than e^-36
@@ -58,27 +59,6 @@ def write_margins(p, memory, point, s, margins):
     margins[Margin.MOTION] = speed / point.speed_scale
     if p[0] > p[1]:
         margins[Margin.SPEED] = memory[Memory.FLAG] * (speed / (MAX_RISE_SPEED * p[3]) - 1)
-
-
-def switch(p, memory, point, s, which):
-    """Change the regime at an event: the direction of motion, or whether the speed is above that at which g is mu_k.
-
-    Parameters
-    ----------
-    p : (k,) array
-        Numbers of the law, in the order that the top of the module names.
-    memory : (l,) array
-        Row of `records.State.memory`.
-    point : Point
-        Load and motion of the interface.
-    s : (j,) array
-        States of the law, in the order that the top of the module names.
-    which : int
-        Margin that has vanished (`records.Margin`).
-    """
-    column = Memory.DIRECTION if which == Margin.MOTION else Memory.FLAG
-    memory[column] = -memory[column]
-    return False
 
 
 def from_law(law, load):
