@@ -11,7 +11,6 @@ PUBLIC = {
     "coarser": (
         "CoarserRuns",
         "estimate_errors",
-        "face_errors",
         "list_step_runs",
         "second_order_errors",
     ),

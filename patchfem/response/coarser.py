@@ -10,15 +10,12 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from typing import NamedTuple
 
-from ..convergence import MAX_CONVERGENCE_ORDER, MIN_CONVERGENCE_ORDER
+from ..convergence import MAX_CONVERGENCE_ORDER
 from .errors import convergence_errors
 from .measures import Values
 
 # Rule of CoarserRuns for a coarser mesh or fewer shear modes.
 second_order_errors = partial(convergence_errors, order=MAX_CONVERGENCE_ORDER)
-# Rule of CoarserRuns for coarser cells of a face. An edge of contact follows the sides of cells, so that its position has an
-# error of a part of a cell that varies irregularly from grid to grid; a higher order shows by chance.
-face_errors = partial(convergence_errors, max_order=MIN_CONVERGENCE_ORDER)
 
 
 class CoarserRuns(NamedTuple):

@@ -11,8 +11,8 @@ from scipy.special import ellipe, ellipk, j0, j1
 
 from patchfem.contact import FaceLoading, make_block, solve_on_set
 from patchfem.contact.bounded import BoundedProblem, solve_bounded
+from patchfem.contact.cell_edges import compute_contact_stiffness, find_row_edges
 from patchfem.contact.press_cells import compute_set_stiffness, press_cells
-from patchfem.contact.row_edges import compute_row_stiffness, find_row_edges
 from patchfem.contact.waves import compute_wave_compliance
 from patchfem.elasticity import BlockShape, Layers, LayerStack, Piece, make_stack
 from patchfem.elasticity.elasticity import lame_constants
@@ -97,10 +97,11 @@ def press_row(row, gap, load: float):
     pressed = press_cells(row, gap[None], FaceLoading(load), tolerance=1e-10)
     pressure = pressed.pressure[0]
     active = pressure > 0
-    unit = np.ones(gap.size)
     rate = solve_on_set(row, active[None])[0]
     edges = find_row_edges(row, pressure, pressed.gap[0], rate)
-    return edges.position[0], compute_row_stiffness(row, active, unit, edges)
+    shift = np.zeros(gap.size)
+    shift[edges.node + edges.side] = edges.fraction - 0.5
+    return edges.position[0], compute_contact_stiffness(row, active[None], shift)
 
 
 def test_exact_row_edges_agree_with_refined_row(n_cells: int = 721):

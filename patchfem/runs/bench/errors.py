@@ -16,7 +16,6 @@ from ...response.coarser import (
     CoarserRuns,
     StepRun,
     estimate_errors,
-    face_errors,
     list_step_runs,
     second_order_errors,
 )
@@ -140,8 +139,7 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
         )
         reference = quarter._replace(steps=steps_on_coarse_mesh)
         runs = tuple(reference._replace(level=level) for level in range(1, len(patches)))
-        rule = convergence_errors if patches[0].model.area is None else face_errors
-        out.append(CoarserRuns(runs, rule, reference, "mesh"))
+        out.append(CoarserRuns(runs, convergence_errors, reference, "mesh"))
     elif has_coarser_mesh:
         # Both runs have the same number of modes, so that only the mesh changes.
         count = fine_run.shear_modes
