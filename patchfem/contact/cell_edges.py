@@ -92,7 +92,7 @@ def find_face_edges(compliance: CellCompliance, pressure, gap) -> FaceEdges:
     return FaceEdges(in_cells.mean() - offset, shift)
 
 
-def compute_contact_stiffness(compliance: CellCompliance, active, shift, motion=1.0) -> float:
+def compute_contact_stiffness(compliance: CellCompliance, active, motion=1.0, shift=0.0) -> float:
     """Compute the stiffness of a contact whose edges may lie between the cells.
 
     Each cell around the set adds its part of the stiffness that the set would gain with all of them: their tractions in
@@ -104,10 +104,10 @@ def compute_contact_stiffness(compliance: CellCompliance, active, shift, motion=
         Compliance of the cells.
     active : (ny, nx) bool ndarray
         Contact set.
-    shift : (ny, nx) ndarray or float
-        Shift of the edge into each cell around the set from the side of the cell, in cells.
     motion : (ny, nx) ndarray or float
         Displacement of the cells per unit: 1 for a translation, x or y for a tilt.
+    shift : (ny, nx) ndarray or float
+        Shift of the edge into each cell around the set from the side of the cell, in cells.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def compute_contact_stiffness(compliance: CellCompliance, active, shift, motion=
     motion = np.broadcast_to(motion, active.shape)
     traction = solve_on_set(compliance, active, motion)
     stiffness = np.vdot(traction, motion)
-    if active.any() and not active.all():
+    if np.any(shift):
         missing = motion - compliance.product(traction)
         gain = solve_on_set(compliance, _widen(active), motion) * missing * ~active
         stiffness += np.sum(shift * gain)

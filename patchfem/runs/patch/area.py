@@ -13,7 +13,7 @@ import numpy as np
 
 from ...contact import cell_edges
 from ...contact.cells import CellCompliance, make_block
-from ...contact.press_cells import FaceLoading, PressedCells, compute_set_stiffness, press_cells
+from ...contact.press_cells import FaceLoading, PressedCells, press_cells
 from ...core import Compliance, ContactState, Interface, Outcome, frozen_array
 from ...elasticity.sides import BlockShape
 from ...model.face import compute_face_gap
@@ -232,7 +232,7 @@ def compute_face_values(patch: AreaPatch) -> Values:
 
     def compute_stiffness(cells, motion=1.0) -> float:
         """Return the stiffness of the contact against a motion of its cells."""
-        return cell_edges.compute_contact_stiffness(cells, active, edges.shift, motion)
+        return cell_edges.compute_contact_stiffness(cells, active, motion, edges.shift)
 
     # What a face has in common with a patch whose pressure varies along x alone
     edge_values = EdgeValues(
@@ -398,7 +398,8 @@ def describe_plane_strain(patch_model: PatchModel | None) -> list[str]:
         cells = make_cells(patch_model, FIRST_CELLS, 1, free_sides)
         everywhere = np.ones(cells.normal.shape, bool)
         stiffness[free_sides] = [
-            compute_set_stiffness(part, everywhere) for part in (cells.normal, cells.tangential)
+            cell_edges.compute_contact_stiffness(part, everywhere)
+            for part in (cells.normal, cells.tangential)
         ]
     normal, shear = (100 * (plane / block - 1) for plane, block in zip(*stiffness.values()))
     return [

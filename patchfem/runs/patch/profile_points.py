@@ -218,7 +218,7 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
 
     def compute_stiffness(compliance, motion=1.0) -> float:
         """Return the stiffness of the contact against a motion of its points."""
-        return cell_edges.compute_contact_stiffness(compliance, active[None], shift, motion)
+        return cell_edges.compute_contact_stiffness(compliance, active[None], motion, shift)
 
     edge_values = EdgeValues(
         length=float(np.diff(intervals).sum()),
