@@ -14,7 +14,7 @@ that the gradients of `bounded` show, and checks the solution. Read `gaps`, `set
 
 Faces that vary along both axes, and rows of thousands of points, are divided into equal cells: `waves` has the closed
 forms of layers, `cells` the compliance of the cells of two blocks, `bounded` the solver, `press_cells` the contact and
-`row_edges` the edges of a row. Read `cells` first.
+`cell_edges` the edges of contact between cells. Read `cells` first.
 """
 
 # Names that other folders use, by module
@@ -27,6 +27,10 @@ PUBLIC = {
         "BoundedProblem",
         "BoundedSolution",
         "solve_bounded",
+    ),
+    "cell_edges": (
+        "compute_contact_stiffness",
+        "find_row_edges",
     ),
     "cells": ("make_block",),
     "contact_sets": ("ContactSets",),
@@ -58,10 +62,6 @@ PUBLIC = {
         "press_state",
     ),
     "press_path_kernels": ("path_mean",),
-    "row_edges": (
-        "compute_row_stiffness",
-        "find_row_edges",
-    ),
     "set_arrays": (
         "REFERENCE_LOAD_INDEX",
         "REFERENCE_MOMENT_INDEX",

@@ -157,26 +157,3 @@ def solve_on_set(
     bound = np.where(active, np.inf, 0.0)
     problem = BoundedProblem(-motion, -bound, bound)
     return solve_bounded(compliance, problem, tolerance=SET_RESIDUAL_TOL).traction
-
-
-def compute_set_stiffness(
-    compliance: CellCompliance, active: np.ndarray, motion: np.ndarray | float = 1.0
-) -> float:
-    """Compute the stiffness of a contact set against a motion of its cells.
-
-    Parameters
-    ----------
-    compliance : CellCompliance
-        Normal or shear compliance.
-    active : (ny, nx) bool ndarray
-        Cells in contact.
-    motion : (ny, nx) ndarray or float
-        Displacement of the cells per unit: 1 for a translation, x or y for a tilt.
-
-    Returns
-    -------
-    float
-        Stiffness [N/m], or [N m/rad] for a tilt.
-    """
-    traction = solve_on_set(compliance, active, motion)
-    return float(np.vdot(traction, np.broadcast_to(motion, active.shape))) * compliance.cell_area

@@ -133,11 +133,6 @@ class Model:
         return bool(self.partial_slip or moves or self.side == "lower")
 
     @property
-    def has_irregular_edges(self) -> bool:
-        """Whether edges of contact follow sides of cells, or points pass them, so that errors of a mesh are irregular."""
-        return self.side == "lower" or (self.patch is not None and self.patch.area is not None)
-
-    @property
     def has_interface_patches(self) -> bool:
         """Whether at least one interface of the rig has a patch."""
         if self.rig is None:

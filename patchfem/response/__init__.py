@@ -10,8 +10,8 @@ functions that evaluate samples.
 PUBLIC = {
     "coarser": (
         "CoarserRuns",
+        "edge_errors",
         "estimate_errors",
-        "face_errors",
         "list_step_runs",
         "second_order_errors",
     ),

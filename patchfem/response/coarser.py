@@ -16,9 +16,9 @@ from .measures import Values
 
 # Rule of CoarserRuns for a coarser mesh or fewer shear modes.
 second_order_errors = partial(convergence_errors, order=MAX_CONVERGENCE_ORDER)
-# Rule of CoarserRuns for coarser cells of a face, and for points that pass an edge of contact. The place of the edge between
-# cells or points has an error of a part of a cell that varies irregularly from grid to grid; a higher order shows by chance.
-face_errors = partial(convergence_errors, max_order=MIN_CONVERGENCE_ORDER)
+# Rule of CoarserRuns for a coarser mesh under points that pass an edge of contact. The place of the edge between the points
+# has an error of a part of their distance that varies irregularly from mesh to mesh; a higher order shows by chance.
+edge_errors = partial(convergence_errors, max_order=MIN_CONVERGENCE_ORDER)
 
 
 class CoarserRuns(NamedTuple):

@@ -10,7 +10,8 @@ import pytest
 from hexahedra import Block, compute_stamp_stiffness
 
 from patchfem.contact import FaceLoading, make_block
-from patchfem.contact.press_cells import compute_set_stiffness, press_cells
+from patchfem.contact.cell_edges import compute_contact_stiffness
+from patchfem.contact.press_cells import press_cells
 from patchfem.core import NotConverged, PatchfemError
 from patchfem.elasticity import BlockShape, Layers, make_stack, sides
 from patchfem.slip.first_loading import (
@@ -52,7 +53,7 @@ def press_square(gap, cells=(64, 64), **loading):
 
 def compute_stiffnesses(block, active):
     """Return the normal and the shear stiffness [N/m] of a contact set."""
-    return tuple(compute_set_stiffness(part, active) for part in block)
+    return tuple(compute_contact_stiffness(part, active) for part in block)
 
 
 # ---- stiffness against elements without waves
@@ -156,8 +157,8 @@ def test_exact_exchange_of_axes():
     _, other = press_square(lambda x, y: ROLL * y + 0 * x)
     peak = one.pressure.max()
     assert other.pressure == pytest.approx(one.pressure.T, abs=1e-6 * peak)
-    tilt = compute_set_stiffness(block.shear, one.pressure > 0)
-    roll = compute_set_stiffness(block.shear, other.pressure > 0)
+    tilt = compute_contact_stiffness(block.shear, one.pressure > 0)
+    roll = compute_contact_stiffness(block.shear, other.pressure > 0)
     assert roll < 0.85 * tilt
 
 
@@ -258,7 +259,7 @@ def test_exact_first_loading_is_concave_and_ends_at_the_limit():
     displacement, force = elements.loading
     slopes = np.diff(force.sum(axis=1)) / np.diff(displacement)
     assert force[-1].sum() == pytest.approx(0.3 * LOAD, rel=1e-9)
-    stiffness = compute_set_stiffness(elements.compliance, elements.pressure_limit > 0)
+    stiffness = compute_contact_stiffness(elements.compliance, elements.pressure_limit > 0)
     assert elements.stiffness.sum() == pytest.approx(stiffness, rel=5e-3)
     assert (np.diff(slopes) < 0).all() and slopes[-1] > 0
 
@@ -330,7 +331,7 @@ def test_exact_rigid_cells_on_a_spring_share_its_force():
     assert elements.stiffness == pytest.approx([1e8])
     forces = elements.force_matrix @ (elements.yield_displacement / 2)
     assert forces == pytest.approx(elements.limit / 2)
-    assert compute_set_stiffness(rigid, limit > 0) == pytest.approx(1e8)
+    assert compute_contact_stiffness(rigid, limit > 0) == pytest.approx(1e8)
     assert find_cell_modes(rigid, limit.ravel(), 4).stiffness.size == 1
 
 
@@ -343,7 +344,7 @@ def test_exact_finer_bricks_keep_partial_slip():
         pressure = press_cells(block.normal, gap, FaceLoading(LOAD)).pressure
         elements = make_cell_elements(block.shear, 0.3 * pressure)
         forces.append(np.minimum(0.17e-6, elements.yield_displacement) @ elements.stiffness)
-        stiffnesses.append(compute_set_stiffness(block.shear, np.ones((64, 64), bool)))
+        stiffnesses.append(compute_contact_stiffness(block.shear, np.ones((64, 64), bool)))
     assert forces[0] == pytest.approx(forces[1], rel=2e-4)
     assert stiffnesses[0] == pytest.approx(stiffnesses[1], rel=1e-3)
 
@@ -363,7 +364,9 @@ def test_exact_small_sphere_on_blocks_has_the_local_stiffness_of_mindlin(radius=
     limit = 0.3 * pressed.pressure
     gross_slip = float(block.shear.product(limit)[limit > 0].max())
     friction = 0.3 * LOAD
-    local = friction / (2 * (gross_slip - friction / compute_set_stiffness(block.shear, limit > 0)))
+    local = friction / (
+        2 * (gross_slip - friction / compute_contact_stiffness(block.shear, limit > 0))
+    )
 
     young, poisson = TITANIUM
     modulus = young / (1 - poisson**2) / 2

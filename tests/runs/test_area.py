@@ -75,6 +75,28 @@ def test_always_flat_block_is_softer_than_plane_strain():
     assert measures["contact_half_width"].value is None
 
 
+@pytest.mark.parametrize("cells, is_coated", [(64, True), (256, True), (64, False)])
+def test_always_peak_that_may_lie_at_a_coated_side_has_no_value(cells, is_coated):
+    """A crown presses most in the middle; cells longer than a stiff coating hide the larger pressure at the sides."""
+    contact = {
+        "length": "6.3706 mm",
+        "width": "3.5965 mm",
+        "height": "1.2678 mm",
+        "load": "17.682 N",
+        "substrate": "aluminium",
+        "coating": {"material": "WC-Co", "thickness": "20.51 um"},
+        "crown": {"radius": "48.32 m"},
+        "tilt": {"angle": "8.402e-06 rad"},
+        "area": {"cells": cells},
+    }
+    if not is_coated:
+        del contact["coating"]
+    peak = pf.run({"contact": contact}).measures["pressure_peak"]
+    assert (peak.value is None) == is_coated
+    if is_coated:
+        assert "free side" in peak.reason
+
+
 @pytest.mark.parametrize(
     "law, work",
     [(COULOMB, 2.460e-3), ({"law": "nonlocal", "static": 0.3, "bond_length": "1 um"}, 1.890e-3)],

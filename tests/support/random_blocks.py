@@ -24,7 +24,7 @@ from patchfem.slip.first_loading import find_reversal, make_cell_elements
 FIRST_SEED = 941_000
 N_BLOCKS = 60
 REFERENCE_CELLS = 512  # along the longer side; a run of a bench has at most half as many
-REFERENCE_SIDE_LEVEL = 2  # a run has bricks of level 1
+REFERENCE_SIDE_LEVEL = 3  # a run has bricks of level 2
 TOLERANCE = 1e-2
 FRICTION = 0.3
 MATERIALS = ("Ti-8Al-1Mo-1V", "steel", "aluminium")

@@ -16,8 +16,8 @@ from ...friction.bonds import engines as bond_engines
 from ...response.coarser import (
     CoarserRuns,
     StepRun,
+    edge_errors,
     estimate_errors,
-    face_errors,
     list_step_runs,
     second_order_errors,
 )
@@ -139,13 +139,13 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
         )
         reference = quarter._replace(steps=steps_on_coarse_mesh)
         runs = tuple(reference._replace(level=level) for level in range(1, len(patches)))
-        rule = face_errors if model.has_irregular_edges else convergence_errors
-        out.append(CoarserRuns(runs, rule, reference, "mesh"))
+        out.append(CoarserRuns(runs, convergence_errors, reference, "mesh"))
     elif has_coarser_mesh:
         # Both runs have the same number of modes, so that only the mesh changes.
         count = fine_run.shear_modes
         coarser = quarter._replace(level=1, modes=count)
-        rule = face_errors if model.has_irregular_edges else second_order_errors
+        is_irregular = model.side == "lower" or model.patch.area is not None
+        rule = edge_errors if is_irregular else second_order_errors
         out.append(CoarserRuns((coarser,), rule, quarter, "mesh"))
         if count:
             coarser = quarter._replace(modes=slip.shear_modes.comparison_mode_count(count))

@@ -1,8 +1,8 @@
 """Pressed face: pressure that varies along x and y, on cells that are halved until the tolerance is met.
 
 In: a `PatchModel` with an area. Out: `AreaPatch`es from fine to coarse, with the names of a `Patch`, whose points are the
-cells. A coarser grid also has coarser bricks of the free sides, so that every error that follows from the changes over the
-grids, of a static measure as of a motion, contains both.
+cells. From grid to grid the bricks of the free sides become finer as well, so that every error that follows from the
+changes over the grids, of a static measure as of a motion, contains both.
 """
 
 from dataclasses import dataclass, replace
@@ -11,17 +11,19 @@ from time import process_time
 
 import numpy as np
 
+from ...contact import cell_edges
 from ...contact.cells import CellCompliance, make_block
-from ...contact.press_cells import FaceLoading, PressedCells, compute_set_stiffness, press_cells
+from ...contact.press_cells import FaceLoading, PressedCells, press_cells
 from ...core import Compliance, ContactState, Interface, Outcome, frozen_array
 from ...elasticity.sides import BlockShape
 from ...model.face import compute_face_gap
 from ...model.patch import PatchModel
 from ...model.pieces import make_layer_stacks
-from ...response.coarser import face_errors
+from ...response.errors import convergence_errors
 from ..results.patch_rows import CELLS_SOURCE, Values, make_measure
 from . import store
 from .measures import (
+    MIN_CONTACT_EDGE_ERROR_IN_CELLS,
     MIN_PLANE_STRAIN_WIDTH_RATIO,
     PRESSURE_PEAK_MEASURES,
     list_larger_terms,
@@ -35,18 +37,15 @@ MIN_CELLS_ACROSS = (
     8  # smallest number of cells along the shorter side, which resolves the free sides
 )
 MIN_GRIDS = 3  # grids after which the order of convergence shows
-SIDE_LEVEL = 1  # level of the bricks of the free sides of the finest grid
-COARSE_SIDE_LEVEL = 0  # level of the bricks of the free sides of coarser grids
-# A boundary of cells counts this part of each of its sides too much (Yastrebov, Anciaux and Molinari, Tribology Letters
-# 65, 2017).
-BOUNDARY_SIDE_FRACTION = (np.pi - 1 + np.log(2)) / 24
-# Error of the number of cells in contact over the root of the number of sides at its boundary: two standard deviations of
-# the sum of as many errors that are even between -.5 and .5
-CELL_COUNT_ERROR = 0.5
+# Level of the finest bricks of the free sides, which grids from the third on have; the next one takes four times as long
+MAX_SIDE_LEVEL = 2
 # Smallest error that is stated, relative to a value and to the larger terms whose difference it is; the contact is solved to
 # 1e-8 of the displacement
 MIN_RELATIVE_ERROR = 1e-7
-FREE_EDGE_REASON = "the largest pressure is at a free side of the face, where it converges too slowly over equal cells"
+# Largest ratio of the pressure at a free side to that of a long cell there, over the root of the shear modulus of the
+# coating over that of the substrate; flat blocks with ratios of 1 to 110 and 64 cells have up to 1
+MAX_SIDE_RISE = 1.25
+FREE_EDGE_REASON = "the largest pressure may be at a free side of the face, where it converges too slowly over equal cells"
 NO_HALF_WIDTH_REASON = "a contact over a face has no half-width; contact_area is its area"
 
 
@@ -221,25 +220,23 @@ def make_loading(patch_model: PatchModel) -> FaceLoading:
 def compute_face_values(patch: AreaPatch) -> Values:
     """Return the values of all static measures of a pressed face by name, in SI units.
 
-    `patch_rows` defines the measures. The fraction in contact is corrected for the sides of the cells at its boundary
-    (`BOUNDARY_SIDE_FRACTION`); a contact over a face has no half-width, so that it is nan.
+    `patch_rows` defines the measures. A contact over a face has no half-width, so that it is nan.
     """
     pieces = patch.model.pieces
     pressure = patch.pressed.pressure
     state = patch.pressure
     active = pressure > 0
     area = pieces.length * pieces.width * pieces.pairs
-    n_cells = active.sum() - BOUNDARY_SIDE_FRACTION * count_boundary_sides(active)
-    fraction = n_cells / active.size
+    normal = patch.pieces.normal
+    edges = cell_edges.find_face_edges(normal, pressure, patch.pressed.gap)
 
     def compute_stiffness(cells, motion=1.0) -> float:
-        """Return the stiffness of the set in contact against a motion of its cells."""
-        return compute_set_stiffness(cells, active, motion) if state.load > 0 else 0.0
+        """Return the stiffness of the contact against a motion of its cells."""
+        return cell_edges.compute_contact_stiffness(cells, active, motion, edges.shift)
 
     # What a face has in common with a patch whose pressure varies along x alone
-    normal = patch.pieces.normal
     edge_values = EdgeValues(
-        length=fraction * pieces.length,
+        length=edges.fraction * pieces.length,
         width=np.nan,
         normal=compute_stiffness(normal),
         tangential=compute_stiffness(patch.pieces.tangential),
@@ -263,10 +260,17 @@ def count_boundary_sides(active: np.ndarray) -> int:
     return sum(np.count_nonzero(np.diff(active, axis=axis)) for axis in (0, 1))
 
 
-def is_peak_at_side(pressure: np.ndarray) -> bool:
-    """Return whether the largest pressure over cells (ny, nx) is in a row or a column at a side of the face."""
-    row, column = np.unravel_index(int(np.argmax(pressure)), pressure.shape)
-    return row in (0, pressure.shape[0] - 1) or column in (0, pressure.shape[1] - 1)
+def may_peak_at_side(patch: AreaPatch) -> bool:
+    """Return whether the largest pressure may be at a free side of the face, on cells of any length.
+
+    Under a stiff coating the pressure rises within about its thickness of a side, which the cells need not resolve.
+    """
+    pressure = patch.pressed.pressure
+    largest_inside = pressure[1:-1, 1:-1].max()
+    at_side = max(part.max() for part in (pressure[[0, -1]], pressure[:, [0, -1]]))
+    stacks = make_layer_stacks(patch.model)
+    rigidity = max(stack.moduli[0][1] / stack.moduli[-1][1] for stack in stacks)
+    return bool(at_side * MAX_SIDE_RISE * np.sqrt(max(rigidity, 1.0)) >= largest_inside)
 
 
 def with_face_measures(
@@ -274,7 +278,7 @@ def with_face_measures(
 ) -> "tuple[AreaPatch | None, ...]":
     """Return a face on successive grids, of which the finest one has its static measures with their errors.
 
-    The errors follow from the changes over the grids (`face_errors`). Without a second grid they are None.
+    The errors follow from the changes over the grids (`convergence_errors`). Without a second grid they are None.
 
     Parameters
     ----------
@@ -292,12 +296,12 @@ def with_face_measures(
     pieces = patch.model.pieces
     series = [compute_face_values(one) for one in patches if one is not None]
     values = series[0]
-    errors = face_errors(*series) if len(series) > 1 else {}
+    errors = convergence_errors(*series) if len(series) > 1 else {}
     larger_terms = list_larger_terms(values, pieces.length / 2, pieces.width / 2)
     active = patch.pressed.pressure > 0
-    count_error = CELL_COUNT_ERROR * np.sqrt(count_boundary_sides(active)) / active.size
+    edge_error = MIN_CONTACT_EDGE_ERROR_IN_CELLS * count_boundary_sides(active) / active.size
     area = values["contact_area"] / (values["contact_fraction"] or 1.0)
-    min_errors = {"contact_fraction": count_error, "contact_area": count_error * area}
+    min_errors = {"contact_fraction": edge_error, "contact_area": edge_error * area}
     measures = {}
     for name, value in values.items():
         larger_term = larger_terms.get(name, 0.0)
@@ -310,7 +314,7 @@ def with_face_measures(
 
     # Measures without a value, for a reason
     reasons = {"contact_half_width": NO_HALF_WIDTH_REASON}
-    if is_peak_at_side(patch.pressed.pressure) and not values.get("yielded_fraction"):
+    if may_peak_at_side(patch) and not values.get("yielded_fraction"):
         reasons |= dict.fromkeys(PRESSURE_PEAK_MEASURES, FREE_EDGE_REASON)
     for name, reason in reasons.items():
         measures[name] = replace(measures[name], value=None, error=None, reason=reason)
@@ -355,26 +359,25 @@ def solve_face_on_grids(
     counts = list_cell_counts(patch_model)
     coarser = ()
 
-    def press(count: int, side_level: int) -> AreaPatch:
-        """Press the face on a number of cells, from the pressure on the grid before."""
-        pieces = make_cells(patch_model, count, side_level)
+    def press(level: int) -> AreaPatch:
+        """Press the face on the cells and bricks of a level, from the pressure on the grid before."""
+        pieces = make_cells(patch_model, counts[level], min(level, MAX_SIDE_LEVEL))
         start = None
         if coarser:
             start = _find_start(coarser[0].pressed.pressure, pieces.normal.shape)
         return press_face(patch_model, pieces, start=start)
 
     if not with_errors:
-        return with_face_measures((press(counts[2], SIDE_LEVEL), None), tolerance)
-
-    # The last grid has finer bricks than the others
-    for number, count in enumerate(counts, 1):
-        if number >= MIN_GRIDS:
-            patch = press(count, SIDE_LEVEL)
-            patches = with_face_measures((patch, *coarser), tolerance)
+        return with_face_measures((press(MIN_GRIDS - 1), None), tolerance)
+    for level in range(len(counts)):
+        patches = (press(level), *coarser)
+        if level >= MIN_GRIDS - 1:
+            patches = with_face_measures(patches, tolerance)
             is_met = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
-            if is_met or count == counts[-1] or patch.pressure.outcome is Outcome.NO_CONTACT:
-                return patches
-        coarser = (press(count, COARSE_SIDE_LEVEL), *coarser)
+            if is_met or patches[0].pressure.outcome is Outcome.NO_CONTACT:
+                break
+        coarser = patches
+    return patches
 
 
 def describe_plane_strain(patch_model: PatchModel | None) -> list[str]:
@@ -392,10 +395,11 @@ def describe_plane_strain(patch_model: PatchModel | None) -> list[str]:
         return []
     stiffness = {}
     for free_sides in ("x", "xy"):
-        cells = make_cells(patch_model, FIRST_CELLS, SIDE_LEVEL, free_sides)
+        cells = make_cells(patch_model, FIRST_CELLS, 1, free_sides)
         everywhere = np.ones(cells.normal.shape, bool)
         stiffness[free_sides] = [
-            compute_set_stiffness(part, everywhere) for part in (cells.normal, cells.tangential)
+            cell_edges.compute_contact_stiffness(part, everywhere)
+            for part in (cells.normal, cells.tangential)
         ]
     normal, shear = (100 * (plane / block - 1) for plane, block in zip(*stiffness.values()))
     return [

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact import cells, press_cells, stiffness
+from ...contact import cell_edges, cells, stiffness
 from ...slip import first_loading, shear_modes
 from . import store
 from .press import Patch
@@ -105,7 +105,7 @@ def compute_stick_stiffness(patch: Patch, factor: float = 1.0, bond_length: floa
     if patch.model.area is not None:
         pressure = np.reshape(patch.normal_stress, patch.shape)
         compliance = add_bonds(patch.slip_compliance.scale(factor), pressure, bond_length)
-        return press_cells.compute_set_stiffness(compliance, pressure > 0)
+        return cell_edges.compute_contact_stiffness(compliance, pressure > 0)
     force = patch.normal_stress * patch.pieces.interface.weight
     points = np.flatnonzero(force > 0)
     nodal = factor * patch.slip_compliance[np.ix_(points, points)]

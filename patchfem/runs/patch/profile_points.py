@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact import row_edges
+from ...contact import cell_edges
 from ...contact.cells import make_block
 from ...contact.edges import find_intervals
 from ...contact.press_cells import press_cells, solve_on_set
@@ -209,17 +209,23 @@ def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointL
     # The edges between the points follow from the pressure at the points in contact.
     unit = np.ones(count)
     pressure_rate = solve_on_set(normal, active[None], unit)[0]
-    contact_edges = row_edges.find_row_edges(normal, pressure, opening, pressure_rate)
+    contact_edges = cell_edges.find_row_edges(normal, pressure, opening, pressure_rate)
     # A loaded point at an end of the interface is in contact as far as this end.
     intervals = find_intervals(half_points[[0, -1]], active[None, [0, -1]], contact_edges)[0]
     are_alike = pieces.are_alike
-    compute_stiffness = row_edges.compute_row_stiffness
+    shift = np.zeros(count)
+    shift[contact_edges.node + contact_edges.side] = contact_edges.fraction - 0.5
+
+    def compute_stiffness(compliance, motion=1.0) -> float:
+        """Return the stiffness of the contact against a motion of its points."""
+        return cell_edges.compute_contact_stiffness(compliance, active[None], motion, shift)
+
     edge_values = EdgeValues(
         length=float(np.diff(intervals).sum()),
         width=float(intervals[-1, 1] - intervals[0, 0]),
-        normal=compute_stiffness(normal, active, unit, contact_edges),
-        tangential=compute_stiffness(shear, active, unit, contact_edges) if are_alike else 0.0,
-        rotational=compute_stiffness(normal, active, x, contact_edges),
+        normal=compute_stiffness(normal),
+        tangential=compute_stiffness(shear) if are_alike else 0.0,
+        rotational=compute_stiffness(normal, x),
     )
 
     # At an end of the interface the pressure is that of the point there.

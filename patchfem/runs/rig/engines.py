@@ -15,7 +15,7 @@ import numpy as np
 from ... import hybrid, slip
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
-from ...response.coarser import CoarserRuns, ComparisonRuns, face_errors, second_order_errors
+from ...response.coarser import CoarserRuns, ComparisonRuns, edge_errors, second_order_errors
 from ...response.errors import (
     convergence_errors,
     estimate_sampling_errors,
@@ -162,9 +162,11 @@ def _list_march_space_runs(model: Model, numerics, patch, n_coarse, solution) ->
     if depends and n_modes:
         meshes[0] = replace(meshes[0], shear_modes=n_modes)
     coarser_runs = [CoarserRuns((mesh,), second_order_errors, quarter, "mesh") for mesh in meshes]
-    if depends and model.has_irregular_edges:
+    is_below = model.side == "lower"
+    if depends and (is_below or model.patch.area is not None):
         runs = tuple(replace(meshes[0], coarse_patch=k + 1) for k in range(min(n_coarse, 2)))
-        coarser_runs[0] = CoarserRuns(runs, face_errors, quarter, "mesh")
+        rule = edge_errors if is_below else convergence_errors
+        coarser_runs[0] = CoarserRuns(runs, rule, quarter, "mesh")
 
     reduction = getattr(solution.contact, "reduction", None)
     has_modes = isinstance(reduction, slip.shear_modes.ShearModes)
