@@ -174,7 +174,7 @@ class BenchModel:
                 models.append(self.keys.build_model(values))
             except PatchfemError:
                 continue  # the search counts this error as a failed evaluation, too
-        return SharedMeshes(models, False)
+        return SharedMeshes(models)
 
     def measure_step_change(self, values: np.ndarray) -> np.ndarray:
         """Return the change (k,) of the computed reading when the time steps are halved.
