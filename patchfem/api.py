@@ -750,8 +750,8 @@ def run_many(
 ) -> CaseResults:
     """Run several scenes or models, and return their measures as arrays with one element per model.
 
-    Similar models are computed together in batches, with the same results as single runs. Patches of equal geometry have
-    a common mesh, as in a sweep.
+    Similar models are computed together in batches, with the same results as single runs. Patches of equal geometry on
+    benches have a common mesh, as in a sweep.
 
     Parameters
     ----------

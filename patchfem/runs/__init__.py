@@ -35,6 +35,7 @@ PUBLIC = {
         "FAILED_OUTCOME",
     ),
     "batch.meshes": (
+        "NO_SHARED_MESHES",
         "SharedMeshes",
         "with_shared_meshes",
     ),

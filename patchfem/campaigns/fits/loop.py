@@ -158,7 +158,7 @@ class LoopComparison(Comparison):
                 models.append(self.keys.build_model(low + part * (high - low)))
             except PatchfemError:
                 continue  # the search counts this error as a failed evaluation, too
-        return SharedMeshes(models, False)
+        return SharedMeshes(models)
 
     def measure_step_change(self, values: Sequence[float]) -> np.ndarray:
         """Return the change (k,) of the computed reading when the time steps are halved; 0 if they have no effect."""

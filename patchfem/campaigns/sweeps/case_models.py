@@ -174,12 +174,15 @@ class SweepScene:
         return sha256(json.dumps(shared, sort_keys=True, default=str).encode()).hexdigest()
 
     def has_shared_meshes(self, keys: Sequence[str]) -> bool:
-        """Return whether the cases have a mesh that is chosen for all of them together.
+        """Return whether the cases may have a mesh that is chosen for all of them together, which those of a rig have not.
 
         `keys` are the swept keys.
         """
+        tables = tomllib.loads(self.text)
+        if "structure" in tables:
+            return False
         set_keys = {*keys, *(split_assignment(text)[0] for text in self.sets)}
-        set_keys |= {f"contact.{key}" for key in tomllib.loads(self.text).get("contact", ())}
+        set_keys |= {f"contact.{key}" for key in tables.get("contact", ())}
         has_contact = any(key.startswith("contact.") for key in set_keys)
         return has_contact and not {"contact.element_size", "contact.mesh"} & set_keys
 

@@ -19,7 +19,7 @@ from ...model.model import Model
 from ...model.similar_models import SimilarModels
 from ...runs.batch import batches
 from ...runs.batch.case_results import CaseResults
-from ...runs.batch.meshes import SharedMeshes
+from ...runs.batch.meshes import NO_SHARED_MESHES, SharedMeshes
 from .case_models import SweepScene
 from .cases import Cases
 
@@ -49,8 +49,8 @@ class WorkerData:
         index of the CaseResults.
     keep : callable, optional
         keep(number, Result) is called after each run.
-    meshes : SharedMeshes or None
-        Meshes common to all cases, from `choose_shared_meshes`.
+    meshes : SharedMeshes
+        Meshes common to all cases, from `prepare_work`.
     plain_keys : tuple of str
         Swept keys whose numbers no check depends on, from `find_plain_keys`; cases that differ only in them have similar
         models.
@@ -62,7 +62,7 @@ class WorkerData:
     cases: Cases
     extract: Callable | None = None
     keep: Callable | None = None
-    meshes: SharedMeshes | None = None
+    meshes: SharedMeshes = NO_SHARED_MESHES
     plain_keys: tuple[str, ...] = ()
     group: Hashable | None = None
 
@@ -140,7 +140,7 @@ def _group_models(
             base = base or work.sweep_scene.build_similar_base(keys, sets)
         if base is None or (base.model.patch is not None and base.model.kind != "patch"):
             continue
-        model = base.model if work.meshes is None else work.meshes.with_shared_meshes(base.model)
+        model = work.meshes.with_shared_meshes(base.model)
         values = np.array([columns[key][places] for key in keys]).T
         is_plain = base.plain_numbers.are_plain(values)
         places = places[is_plain]
@@ -166,14 +166,14 @@ def _build_case_model(work: WorkerData, number: int):
         model = work.sweep_scene.build_model(work.cases.assignments(number))
     except PatchfemError as error:
         return error
-    return model if work.meshes is None else work.meshes.with_shared_meshes(model)
+    return work.meshes.with_shared_meshes(model)
 
 
 def prepare_work(work: WorkerData) -> WorkerData:
     """Return the data of a sweep, `work`, with what all its cases determine together: plain keys, engine and meshes.
 
-    All cases of the sweep count, also those that are already computed. No meshes are chosen without a patch, or for
-    patches that are solved in blocks, each of which has its own meshes.
+    All cases of the sweep count, also those that are already computed. No meshes are chosen for rigs, for patches that wear,
+    and for patches that are solved in blocks, each of which has its own meshes.
     """
     cases = work.cases
     keys = [axis.key for axis in cases.axes]
@@ -186,11 +186,11 @@ def prepare_work(work: WorkerData) -> WorkerData:
     if work.keep is None:
         plain_keys = work.sweep_scene.find_plain_keys(keys, cases.assignments(number))
         work = replace(work, plain_keys=plain_keys, group=batches.find_group(first, len(cases)))
-    if first.patch is None or work.has_blocks:
+    if first.patch is None or not first.patch.mesh.is_fine or work.has_blocks:
         return work
     numbers = cases.spread_case_numbers(MAX_MESH_CASES)
     models = chain.from_iterable(group for _, group in _group_models(work, np.array(numbers)))
-    return replace(work, meshes=SharedMeshes(models, len(numbers) == len(cases)))
+    return replace(work, meshes=SharedMeshes(models))
 
 
 def _list_blocks(work: WorkerData, numbers: Sequence[int]) -> list[list[int]]:

@@ -30,7 +30,7 @@ def find_group(model: Model, n_study_cases: int) -> Hashable | None:
     if n_study_cases < MIN_CASES_TO_GROUP or model.kind != "rig":
         return None
     try:
-        return None if lumped.refusal_reason(model) else lumped.group_key(model)
+        return lumped.find_group(model)
     except one_by_one.FAILED_CASE_ERRORS:  # a single run of the case reports its error
         return None
 

@@ -131,70 +131,51 @@ class Refined(NamedTuple):
     is_met: np.ndarray
 
 
-def refusal_reason(model: Model) -> str:
-    """Return why the batch kernel cannot compute a model, or "" if it can.
+def find_group(model: Model) -> tuple[int, str] | None:
+    """Return a key that is equal for models that one call of the kernel computes, or None if it cannot compute a model.
 
-    The kernel steps one mode with one contact point under a sine, and a constant load.
+    The kernel steps one mode with one contact point under a sine, and a constant load. The key has the number of cycles and
+    the friction law.
     """
     rig = model.rig
-    if rows.SINGLE_RUN_ROWS:
-        return f"the measure {rows.SINGLE_RUN_ROWS[0].name} is computed only by single runs"
-    if (
-        model.kind != "rig"
-        or model.patch is not None
-        or model.wear is not None
-        or has_unreadable_measurements(model)
-    ):
-        return "the contact of the case is not a single point, or its table of measured responses cannot be read"
-
-    # The kernel has one slip variable per case, one normal force and a linear flexure.
+    if rows.SINGLE_RUN_ROWS or model.kind != "rig" or model.patch is not None:
+        return None
     friction = model.friction
     modes = rig.modes
-    if (
-        len(rig.friction.interfaces) != 1
+    drive = rig.drive
+    is_one_point = not (
+        model.wear is not None
+        or has_unreadable_measurements(model)
+        or len(rig.friction.interfaces) != 1
         or rig.friction.load_varies
         or rig.friction.names
         or rig.springs.is_nonlinear
         or np.isfinite(rig.springs.travel)
         or friction.law not in POINT_LAWS
-    ):
-        return "the interface of the case is not one point under a constant load, or its flexure has an end stop"
-
+    )
     # A bond population is one state variable only if all bonds are alike and do not grow.
-    if law_has_trait(friction.law, "bonds") and (
+    is_one_state = not law_has_trait(friction.law, "bonds") or not (
         needs_bond_list(friction) or friction.slip_growth is not None or friction.initial_bonds != 1
-    ):
-        return "its bonds grow, differ or are computed as a list of bonds"
-
-    # The kernel marches displacement and velocity of one mode.
-    if (
-        modes.omega.size != 1
-        or modes.gauge is not None
-        or rig.structure.richer_rig is not None
-        or not isinstance(rig.drive.signal, SineDrive)
-        or rig.drive.levels.amplitudes
-        or not (modes.base[0] and modes.slide[0] and modes.output[0])
-    ):
-        return "the case is not one mode with one sensor under one sine"
-
-    # All cases of a group have arrays of one length, so that the cycles are whole and bounded.
-    cycles = rig.drive.cycles
-    if not MIN_BATCH_CYCLES <= cycles <= MAX_BATCH_CYCLES or cycles != int(cycles):
-        return "its number of cycles is not whole, too small or too large"
-
-    # The only setting of the kernel is its number of steps, which follows from the tolerance.
-    if (
-        model.accuracy.method != "auto"
-        or list_fixed_settings(model.accuracy)
-        or model.accuracy.tolerance < MIN_BATCH_TOLERANCE
-    ):
-        return "the case asks for another method, or for an accuracy beyond that of a batch"
-    return ""
-
-
-def group_key(model: Model) -> tuple[int, str]:
-    """Return a key that is equal for models that one call of the kernel computes: number of cycles, and friction law."""
-    return int(model.rig.drive.cycles), model.friction.law
+    )
+    is_one_mode = (
+        modes.omega.size == 1
+        and modes.gauge is None
+        and rig.structure.richer_rig is None
+        and isinstance(drive.signal, SineDrive)
+        and not drive.levels.amplitudes
+        and modes.base[0] * modes.slide[0] * modes.output[0] != 0
+    )
+    # The cycles of a group are whole and bounded, and its only setting is the number of steps.
+    is_plain = (
+        MIN_BATCH_CYCLES <= drive.cycles <= MAX_BATCH_CYCLES
+        and drive.cycles == int(drive.cycles)
+        and model.accuracy.method == "auto"
+        and not list_fixed_settings(model.accuracy)
+        and model.accuracy.tolerance >= MIN_BATCH_TOLERANCE
+    )
+    if not (is_one_point and is_one_state and is_one_mode and is_plain):
+        return None
+    return int(drive.cycles), friction.law
 
 
 def solve(models: Sequence[Model], report: Callable | None = None) -> CaseResults:

@@ -187,7 +187,10 @@ def list_larger_terms(
 
 
 def estimate_static_measures(
-    fine: PressedCases, series: list[MeshValues], tolerance: float | None = None
+    fine: PressedCases,
+    series: list[MeshValues],
+    tolerance: float | None = None,
+    centre_error: float | None = None,
 ) -> StaticEstimates:
     """Return the static measures of pressed cases with their error estimates.
 
@@ -209,6 +212,8 @@ def estimate_static_measures(
         The same cases on all meshes from coarse to fine, the last one that of `fine`.
     tolerance : float or None
         Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
+    centre_error : float
+        Error of the centre of a resolved contact [cell lengths]; by default that of a mesh for one contact.
 
     Returns
     -------
@@ -218,7 +223,10 @@ def estimate_static_measures(
     names = tuple(finest)
     n_meshes = _count_meshes_with_same_intervals(fine, series)
     missed_peak = unresolved_edge_rounding_pressure(fine)
-    hidden_errors = estimate_hidden_errors(_compute_resolution(fine, missed_peak), finest)
+    resolution = _compute_resolution(fine, missed_peak)
+    if centre_error is not None:
+        resolution = resolution._replace(centre_error=centre_error)
+    hidden_errors = estimate_hidden_errors(resolution, finest)
     factor = np.where(missed_peak > 0, UNRESOLVED_ROUNDING_ERROR_FACTOR, 1.0)
     values = np.array(list(finest.values()))
     errors = np.full(values.shape, np.nan if len(series) == 1 else 0.0)
@@ -545,6 +553,8 @@ class Resolution(NamedTuple):
     - rounding_pressure: peak pressure [Pa] of a rounded end that the mesh does not resolve.
     - open_ends: length of the rounded surface on which a contact edge may lie [m].
     - inner_cells: part of `edge_cells` between contact intervals [m].
+    - centre_error: error of the centre of a resolved contact, in cells; on a mesh for one contact the errors of its ends
+      cancel.
     """
 
     length: float
@@ -559,6 +569,7 @@ class Resolution(NamedTuple):
     rounding_pressure: np.ndarray | float = 0.0
     open_ends: np.ndarray | float = 0.0
     inner_cells: np.ndarray | float = 0.0
+    centre_error: float = 1e-3
 
 
 def _compute_resolution(pressed: PressedCases, missed_peak) -> Resolution:
@@ -644,7 +655,7 @@ def estimate_hidden_errors(resolution: Resolution, finest: "Arrays | Values") ->
     # resolved contact is far more accurate than its edges, because their position errors are alike.
     cell = np.maximum(resolution.longest_cell, resolution.edge_cells / 2)
     is_unresolved = n_nodes <= MAX_UNRESOLVED_CONTACT_NODES
-    centre_error = np.where(is_unresolved, cell / (2 * n_nodes**2), 1e-3 * cell)
+    centre_error = np.where(is_unresolved, cell / (2 * n_nodes**2), resolution.centre_error * cell)
 
     has_few_nodes = (cell > 0) & (n_nodes <= MIN_RESOLVED_CONTACT_NODES)
     peak_error = resolution.corner_pressure + np.where(has_few_nodes, peak / (4 * n_nodes**2), 0.0)

@@ -62,27 +62,31 @@ def solve_with_coarser(
     mesh = patch_model.mesh
     if patch_model.area is not None:
         return solved or area.solve_face_on_grids(patch_model, tolerance, with_errors=with_errors)
-    if mesh.shared is None and mesh.is_automatic:
-        return solve_on_refined_meshes(patch_model, tolerance, with_errors, solved)
-    levels = (mesh.shared or make_given_meshes(patch_model))[: None if with_errors else 1]
 
     def solve() -> Patches:
-        """Solve the patch on the meshes that the scene prescribes or that the cases of a sweep share."""
+        """Solve the patch on its own meshes, on those that the scene prescribes, or on those that cases share."""
+        if mesh.shared is None and mesh.is_automatic:
+            return solve_on_refined_meshes(patch_model, tolerance, with_errors, solved)
+        levels = (mesh.shared or make_given_meshes(patch_model))[: None if with_errors else 1]
         if mesh.shared is not None:
             pairs = [condense_once(patch_model, *level) for level in levels]
         else:
-            # Only the finest mesh needs factors, for the stress inside the pieces.
+            # Only the finest mesh needs factors, for the stress inside the pieces. The patches of many rigs do not keep
+            # them.
             pairs = [
-                condense(patch_model, *level, keep_factors=level is levels[0]) for level in levels
+                condense(patch_model, *level, keep_factors=mesh.is_fine and level is levels[0])
+                for level in levels
             ]
         return solve_on_pairs(patch_model, pairs, tolerance)
 
-    if mesh.shared is None:
+    # Many runs of a rig have the same patch, whose coarse mesh needs little memory
+    if mesh.is_fine and mesh.shared is None:
         return solve()
     key = ("patches", store.content_key(patch_model), tolerance, with_errors)
     patches = store.get_or_compute(key, solve)
-    has_profile = mesh.is_automatic and patch_model.gap.profile is not None
-    if has_profile and max_mesh_error_ratio(patches[0].measures, tolerance) > 1:
+    is_profile_shared = mesh.shared is not None and patch_model.gap.profile is not None
+    is_missed = max_mesh_error_ratio(patches[0].measures, tolerance) > 1
+    if mesh.is_automatic and is_profile_shared and is_missed:
         return solve_on_refined_meshes(patch_model.with_mesh(shared=None), tolerance)
     return patches
 
@@ -200,11 +204,11 @@ def solve_on_refined_meshes(
             patch = solved[-1 - number]
         elif with_errors or number == MIN_NESTED_MESHES - 1:
             # Only the last mesh needs factors, for the stress inside the pieces, which is computed on a coarser mesh if
-            # this one is expensive.
+            # this one is expensive. The patches of many rigs do not keep them.
             if coarse is not None:
                 coarse.pair.forget_factors()
             try:
-                keeps = number >= MIN_NESTED_MESHES - 1
+                keeps = patch_model.mesh.is_fine and number >= MIN_NESTED_MESHES - 1
                 keeps &= not is_too_expensive(patch_model, meshes)
                 pair = condense(patch_model, *meshes, keep_factors=keeps)
                 patch = solve_patch_contact(patch_model, pair, coarse=coarse)

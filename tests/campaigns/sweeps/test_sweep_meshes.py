@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scene_texts import COULOMB, DRIVE, MODE, PATCH
 
+import patchfem as pf
 from patchfem.campaigns import Cases, SweepScene, WorkerData, iterate_chunks
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import prepare_work
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_assignments
 
@@ -24,15 +24,15 @@ WORK = WorkerData(
 )
 
 
-def test_exact_meshes_are_chosen_once_for_all_cases():
-    """The mesh of a sweep is chosen once and stored with its work; twice as long cells meet four times the tolerance."""
-    sizes = []
-    for tolerance in (1e-3, 4e-3):
-        scene = SweepScene(Path("a.toml"), f"{PATCH}{MOTION}[accuracy]\ntolerance = {tolerance}\n")
-        work = prepare_work(WorkerData(scene, WORK.cases))
-        ((finest, *_),) = work.meshes.meshes.values()
-        sizes.append(finest[0].x.size)
-    assert sizes[0] / sizes[1] == pytest.approx(2, rel=0.1)
+def test_exact_rigs_have_the_meshes_of_single_runs():
+    """The values of a sweep of rigs are those of single runs."""
+    scene = SweepScene(Path("a.toml"), PATCH + MOTION)
+    work = WorkerData(scene, WORK.cases)
+    for (number,), results, _ in iterate_chunks(work, [0, 3], LocalExecutor()):
+        single = pf.run(scene.build_model(work.cases.assignments(number))).measures
+        for name in results.values:
+            if single[name].value is not None:
+                np.testing.assert_allclose(results.values[name], single[name].value, 1e-9)
 
 
 @pytest.mark.slow
