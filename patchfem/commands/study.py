@@ -144,8 +144,8 @@ def fit(
     starts: Annotated[
         int | None,
         Parameter(
-            help="number of random starts inside the ranges, such as 20; the best result is used; default: 8, or 6 for a "
-            "curve of frequency and damping against amplitude"
+            help="number of starting points inside the ranges, such as 20; the best result is used; default: 8 for rows of "
+            "a rig, 6 for a curve of frequency and damping against amplitude, 3 for a loop"
         ),
     ] = None,
     set_: Sets = (),

@@ -105,12 +105,31 @@ def make_answer(fitted: FittedKeys) -> Answer:
     parts = _DESCRIBE_FUNCTIONS[type(comparison)](fitted)
     scene = fitted.keys.scene
     fit = fitted.fit
+
+    # fitted values, and combinations of them that the data do not determine
+    values = {}
+    measures = {}
+    for k, bound in enumerate(fitted.keys.ranges):
+        low, high = fit.intervals.ends[k].tolist()
+        reason = "" if np.isfinite(low) else "the measurement does not determine an interval"
+        one = Quantity(fit.values[k], bound.unit, None, low, high, reason=reason)
+        measures[bound.key] = one
+        values[bound.key] = one.as_json() | {
+            "method": fit.intervals.methods[k],
+            "bounds": [bound.low, bound.high],
+            "at_bound": fit.at_bound[k] or None,
+            "sensitivity": fit.intervals.sensitivity[k],
+        }
+    unknown = [dict(zip(values, row, strict=True)) for row in fit.intervals.unknown.tolist()]
+
     details = {
         "patchfem": __version__,
         "title": scene.title,
         "outcome": str(fit.outcome),
         "measured": comparison.path.name,
-        **_describe_values(fitted),
+        "values": values,
+        "unknown": [{name: part for name, part in row.items() if part} for row in unknown],
+        "correlation": fit.intervals.correlation,
         "evaluations": fit.counts.evaluations,
         "failures": fit.counts.failures,
         "descents_agreed": fit.n_best,
@@ -123,14 +142,6 @@ def make_answer(fitted: FittedKeys) -> Answer:
         "scores": {name: score.value for name, score in parts.scores.items()},
         **parts.details,
     }
-
-    # fitted values; without an interval they have the reason
-    measures = {}
-    for name, entry in details["values"].items():
-        reason = "" if entry["interval"] else "the measurement does not determine an interval"
-        low, high = entry["interval"] or (None, None)
-        entry |= {"low": low, "high": high}
-        measures[name] = Quantity(entry["value"], entry["unit"], None, low, high, reason=reason)
 
     # the verdict names the most correlated pair of values if their correlation is strong
     verdict = [_make_headline(details, measures), parts.residual]
@@ -173,29 +184,6 @@ def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Variables:
     order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
     texts = [f"{names[first[k]]}, {names[second[k]]}" for k in order]
     return make_columns("pair", {"pair": (texts, ""), "correlation": (values[order], "1")})
-
-
-def _describe_values(fitted: FittedKeys) -> JsonObject:
-    """Return the fitted values with intervals, and what the data leave open, as objects of fit.json."""
-    fit = fitted.fit
-    intervals = fit.intervals
-    values = {}
-    for k, bound in enumerate(fitted.keys.ranges):
-        ends = intervals.ends[k].tolist()
-        values[bound.key] = {
-            "value": fit.values[k],
-            "unit": bound.unit,
-            "interval": ends if np.isfinite(ends).all() else None,
-            "method": intervals.methods[k],
-            "bounds": [bound.low, bound.high],
-            "at_bound": fit.at_bound[k] or None,
-            "sensitivity": intervals.sensitivity[k],
-        }
-
-    # combinations of values that the data do not determine, without the values that do not take part
-    unknown = [dict(zip(values, row, strict=True)) for row in intervals.unknown.tolist()]
-    unknown = [{name: part for name, part in row.items() if part} for row in unknown]
-    return {"values": values, "unknown": unknown, "correlation": intervals.correlation}
 
 
 def describe_loop_fit(fitted: FittedKeys) -> Parts:
@@ -353,20 +341,9 @@ def describe_wear_fit(fitted: FittedKeys) -> Parts:
         "curve_depth": (comparison.factor * depths[is_drawn], "m"),
     }
 
-    # what the interval of the coefficient contains
-    parts = []
-    if depth.low < depth.high:
-        name = depth.name.replace("_", " ")
-        text = format_quantity(depth.name, Quantity(depth.value, "m", None, depth.low, depth.high))
-        parts.append(f"that of the measured {name}, {text},")
-    if comparison.error is not None:
-        error = format_length(comparison.error, 2)
-        parts.append(f"the numerical error of the computed depth, {error}")
-    computed = fitted.computed[0]
-    residual = f"The computed depth is {format_length(computed)}."
-    if parts:
-        residual = f"The interval contains {' and '.join(parts)}."
-    scores = {"fitted_depth": Quantity(computed, "m", comparison.error)}
+    scores = {"fitted_depth": Quantity(fitted.computed[0], "m", comparison.error)}
+    text = format_quantity("fitted_depth", scores["fitted_depth"])
+    residual = f"The computed depth is {text}; it was measured as {format_length(depth.low)} to {format_length(depth.high)}."
     data = make_columns("point", points) | make_columns("curve_coefficient", curve)
     measured = comparison.path.name.replace("--to", depth.name)
     details = {"measured": measured, "model_error": comparison.error}

@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 from .space import UnitCubeResidual
 
 COST_TOL = 1e-10  # relative change of the sum of squares per step at convergence
-QUICK_COST_TOL = 1e-4  # COST_TOL of a quick descent
+QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
 MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
 
 
@@ -27,7 +27,7 @@ class Descent(NamedTuple):
     rows: int
 
 
-def descend(model: UnitCubeResidual, u, free, *, is_quick: bool = False) -> Descent:
+def descend(model: UnitCubeResidual, u, free) -> Descent:
     """Minimize a residual locally from a point of the unit cube (trust-region reflective method).
 
     The final sum of squares is never larger than that at the start.
@@ -40,8 +40,6 @@ def descend(model: UnitCubeResidual, u, free, *, is_quick: bool = False) -> Desc
         Starting point.
     free : sequence of int
         Indices of the free coordinates.
-    is_quick : bool
-        Whether the search ends at a looser tolerance, with one-sided differences.
 
     Returns
     -------
@@ -69,11 +67,11 @@ def descend(model: UnitCubeResidual, u, free, *, is_quick: bool = False) -> Desc
     scale = max(np.abs(residual).max(), 1e-300)
 
     # the residual is scaled because the method stops at an absolute gradient
-    ftol = QUICK_COST_TOL if is_quick else COST_TOL
+    ftol = QUICK_COST_TOL if model.is_expensive else COST_TOL
     result = least_squares(
         lambda part: model.evaluate_or_penalize(fixed + select @ part) / scale,
         inner,
-        jac=lambda part: model.jacobian(fixed + select @ part, free, is_quick=is_quick) / scale,
+        jac=lambda part: model.jacobian(fixed + select @ part, free) / scale,
         bounds=(0, 1),
         ftol=ftol,
         xtol=10 * ftol,

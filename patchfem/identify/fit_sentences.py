@@ -10,7 +10,7 @@ from .least_squares import Fit
 MIN_SENSITIVITY = 1e-9
 
 
-def describe_fit(fit: Fit, names) -> list[str]:
+def describe_fit(fit: Fit, names, bounds=()) -> list[str]:
     """Return sentences about parameters that a fit does not determine, and failures of its search.
 
     The sentences report parameters that are at a bound, without effect, determined only in combination with
@@ -22,16 +22,19 @@ def describe_fit(fit: Fit, names) -> list[str]:
         Best fit, with its intervals.
     names : sequence of str
         Names (n,) of the parameters.
+    bounds : sequence of (str, str)
+        Low and high bound of each parameter with its unit.
 
     Returns
     -------
     list of str
     """
     sentences = []
-    for name, side, value in zip(names, fit.at_bound, fit.values):
+    for name, side, (low, high) in zip(names, fit.at_bound, bounds):
         if side:
+            bound = low if side == "low" else high
             sentences.append(
-                f"{name} is at its {side} bound {value:.6g}: widen the range, or try another law"
+                f"{name} is at its {side} bound {bound}: widen the range, or try another law"
             )
 
     # Parameters in an undetermined combination are reported with it, not one by one.

@@ -227,8 +227,10 @@ def compute_intervals(
         direction = np.zeros(n)
         if k in free:
             direction[free] = half_width[k] * covariance[k, free] / covariance[k, k]
+        # known errors are stated by their ends, which only the profile reproduces
         if k not in free or (
-            half_width[k] >= MIN_INTERVAL_HALF_WIDTH and not minimum.is_linear(direction)
+            half_width[k] >= MIN_INTERVAL_HALF_WIDTH
+            and (kind == IntervalKind.KNOWN or not minimum.is_linear(direction))
         ):
             methods[k] = "profile"
             others = [other for other in np.flatnonzero(has_effect) if other != k]

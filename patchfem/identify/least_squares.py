@@ -1,11 +1,11 @@
 """Least squares with bounds: fitted parameters, 95 % intervals, and undetermined directions.
 
 The parameters are mapped to the unit cube, on a logarithmic scale if the bounds are positive and wide. Local
-searches (descents) start from several points, the same in every call. If they are quick, they use one-sided
-differences, and the best of them is continued with central ones. The confidence intervals are those of the linearized
-problem, with Student's t distribution for (rows - parameters) degrees of freedom. In a time series, only the independent
-rows count (`correlation`). If the residual is not linear over an interval, or the parameter lies on a bound, the interval
-follows from the profile of the sum of squares.
+searches (descents) start from several points, the same in every call. If evaluations are expensive, they use
+one-sided differences, and the best of them is continued with central ones. The confidence intervals are those of the
+linearized problem, with Student's t distribution for (rows - parameters) degrees of freedom. In a time series, only the
+independent rows count (`correlation`). If the residual is not linear over an interval, or the parameter lies on a bound,
+the interval follows from the profile of the sum of squares.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,8 +23,6 @@ from .space import (
     make_space_filling_points,
 )
 
-# Largest root mean square residual of an exact fit, relative to the largest residual of the search.
-EXACT_FIT_RATIO = 1e-9
 # A descent has reached the best minimum if the ratio of its residual to the smallest one is at most this value.
 SAME_MINIMUM_RATIO = 1.01
 # Largest distance from a bound at which a parameter is tried on the bound, relative to its range.
@@ -58,7 +56,7 @@ class Fit:
     @property
     def n_best(self) -> int:
         """Number of descents that ended within 1 % of the smallest residual."""
-        return _count_best(self.descent_rms, self.descent_rms.min())
+        return np.count_nonzero(self.descent_rms <= SAME_MINIMUM_RATIO * self.descent_rms.min())
 
     def widen(self, changes, bounds) -> "Fit":
         """Return this fit with intervals that contain the effect of numerical errors of the model.
@@ -96,12 +94,13 @@ class Problem:
         is not finite.
     low, high : sequence of float
         Bounds (n,).
-    start : sequence of float, optional
-        Parameters (n,) from which the first descent starts, NaN for the middle of a range.
-    earlier : Fit, optional
-        Result of an earlier search, which is the start instead; its descents and evaluations count in the result.
+    start : sequence of float or Fit, optional
+        Parameters (n,) from which the first descent starts, NaN for the middle of a range; or the result of an earlier
+        search, whose descents and evaluations count in the result.
     before_start : callable, optional
         Called before each starting point and each descent.
+    is_expensive : bool
+        Whether all descents but the last use a looser tolerance and one-sided differences.
     """
 
     def __init__(
@@ -109,29 +108,26 @@ class Problem:
         residual: Callable[[np.ndarray], np.ndarray],
         low: Sequence,
         high: Sequence,
-        start: Sequence | None = None,
-        earlier: Fit | None = None,
+        start: Sequence | Fit | None = None,
         before_start: Callable[[], None] = lambda: None,
+        *,
+        is_expensive: bool = False,
     ):
-        self.model = UnitCubeResidual(residual, make_search_space(low, high))
+        space = make_search_space(low, high)
+        self.model = UnitCubeResidual(residual, space, is_expensive=is_expensive)
         self.start = start
-        self.earlier = earlier
-        if earlier is not None:
-            self.start = earlier.values
-            self.model.counts = earlier.counts
+        self.earlier_rms = None
+        if isinstance(start, Fit):
+            self.start = start.values
+            self.earlier_rms = start.descent_rms
+            self.model.counts = start.counts
         self.before_start = before_start
 
     def solve(self, max_descents: int = 3, interval_kind: str = IntervalKind.ROWS) -> Fit:
         """Minimize the sum of squares of the residual (`search`), and compute intervals (`add_intervals`)."""
         return self.add_intervals(self.search(max_descents), interval_kind)
 
-    def search(
-        self,
-        max_descents: int,
-        *,
-        is_quick: bool = False,
-        report: Callable[[], None] = lambda: None,
-    ) -> Fit:
+    def search(self, max_descents: int, report: Callable[[], None] = lambda: None) -> Fit:
         """Minimize the sum of squares from the start of the problem and the best of some trial points.
 
         Parameters
@@ -139,8 +135,6 @@ class Problem:
         max_descents : int
             Largest number of descents. With one, only that from the start of the problem, unless the evaluation there
             fails.
-        is_quick : bool
-            Whether the descents but the last use a looser tolerance and one-sided differences.
         report : callable
             Called after each descent.
 
@@ -165,21 +159,22 @@ class Problem:
         ends = []
         for start in starts:
             self.before_start()
-            ends.append(descend(model, start, range(n), is_quick=is_quick))
+            ends.append(descend(model, start, range(n)))
             report()
-            # a fit that is exact to round-off is not repeated
-            if ends[-1].cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
-                break
         best = min(ends, key=lambda end: end.cost)
         descent_rms = np.sqrt([end.cost / end.rows for end in ends])
-        if is_quick:
+        if model.is_expensive:
+            # the best descent is continued with central differences
             self.before_start()
+            model.is_expensive = False
             best = descend(model, best.u, range(n))
+            model.is_expensive = True
         rms = np.sqrt(best.cost / best.rows)
-        is_converged = best.is_converged or _count_best(descent_rms, rms) > 1
+        n_confirming = np.count_nonzero(descent_rms <= SAME_MINIMUM_RATIO * rms)
+        is_converged = best.is_converged or n_confirming > 1
         outcome = Outcome.DONE if is_converged else Outcome.NOT_CONVERGED
-        if self.earlier is not None:
-            descent_rms = self.earlier.descent_rms
+        if self.earlier_rms is not None:
+            descent_rms = self.earlier_rms
         values = model.space.to_values(best.u)
         return Fit(values, _name_bounds(best.u), None, rms, model.counts, outcome, descent_rms)
 
@@ -209,13 +204,18 @@ class Problem:
         )
 
     def _choose_starts(self, max_points: int) -> list[np.ndarray]:
-        """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points."""
+        """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points.
+
+        If evaluations are expensive, no more points are tried than needed.
+        """
         space = self.model.space
         n = space.low.size
         given = [] if self.start is None else [space.to_unit_cube(self.start)]
         points = [point for point in given if np.isfinite(self._try_point(point))]
+        trials = []
         if max_points > len(points):
-            trials = make_space_filling_points(N_TRIALS_PER_VALUE * n, n)
+            count = max_points if self.model.is_expensive else N_TRIALS_PER_VALUE * n
+            trials = make_space_filling_points(count, n)
             costs = np.array([self._try_point(point) for point in trials])
             order = np.argsort(costs, kind="stable")
             points += [trials[k] for k in order if np.isfinite(costs[k])]
@@ -235,11 +235,6 @@ class Problem:
 def _name_bounds(u: np.ndarray) -> tuple[str, ...]:
     """Return "low", "high" or "" for each coordinate `u` (n,) of the unit cube."""
     return tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist())
-
-
-def _count_best(descent_rms: np.ndarray, smallest: float) -> int:
-    """Return the number of descents within 1 % of the smallest root mean square."""
-    return int(np.count_nonzero(descent_rms <= SAME_MINIMUM_RATIO * smallest))
 
 
 def _move_onto_bounds(

@@ -112,12 +112,20 @@ class UnitCubeResidual:
     residual : callable
         Function of the parameters (n,) that returns the residual (r,).
     space : SearchSpace
-        Mapping of the parameters to the unit cube.
+    is_expensive : bool
+        Whether derivatives are one-sided differences.
     """
 
-    def __init__(self, residual: Callable[[np.ndarray], np.ndarray], space: SearchSpace):
+    def __init__(
+        self,
+        residual: Callable[[np.ndarray], np.ndarray],
+        space: SearchSpace,
+        *,
+        is_expensive: bool = False,
+    ):
         self.residual = residual
         self.space = space
+        self.is_expensive = is_expensive
         self.counts = SearchCounts(0, 0, "")
         self.largest = 0.0
         self.rows = 0
@@ -156,10 +164,10 @@ class UnitCubeResidual:
         self.counts = self.counts.add(SearchCounts(1, 1, reason))
         return None
 
-    def jacobian(self, u, free, *, is_quick: bool = False) -> np.ndarray:
+    def jacobian(self, u, free) -> np.ndarray:
         """Compute the derivatives (r, f) of the residual along selected coordinates by finite differences.
 
-        The differences are central, or one-sided at a bound, beside a failed evaluation and if they are to be quick.
+        The differences are central, or one-sided at a bound, beside a failed evaluation and for an expensive residual.
 
         Parameters
         ----------
@@ -167,8 +175,6 @@ class UnitCubeResidual:
             Point of the unit cube.
         free : sequence of int
             Indices of the f coordinates that vary.
-        is_quick : bool
-            Whether one-sided differences suffice.
         """
         columns = np.zeros((len(free), self.rows))
         for column, coordinate in zip(columns, free):
@@ -176,7 +182,7 @@ class UnitCubeResidual:
             for step in (FINITE_DIFFERENCE_STEP, -FINITE_DIFFERENCE_STEP, 0.0):
                 point = np.array(u, float)
                 point[coordinate] += step
-                is_wanted = len(evaluated) < 2 and not (is_quick and evaluated and step)
+                is_wanted = len(evaluated) < 2 and not (self.is_expensive and evaluated and step)
                 if is_wanted and 0 <= point[coordinate] <= 1:
                     residual = self(point)
                     if residual is not None:

@@ -76,27 +76,12 @@ def make_residual(cells, computed: ModelReadings, seen):
     return residual
 
 
-def run_descents(
-    model: UnitCubeResidual, points, before_descent, *, is_quick: bool = True
-) -> list[Descent]:
-    """Return the descents from points (n,) of the unit cube; `before_descent` is called before each.
-
-    Parameters
-    ----------
-    model : UnitCubeResidual
-    points : iterable of (n,) array
-    before_descent : callable
-    is_quick : bool
-        Whether a loose tolerance suffices.
-
-    Returns
-    -------
-    list of Descent
-    """
+def run_descents(model: UnitCubeResidual, points, before_descent) -> list[Descent]:
+    """Return the descents from points (n,) of the unit cube; `before_descent` is called before each."""
     ends = []
     for point in points:
         before_descent()
-        ends.append(descend(model, point, range(len(point)), is_quick=is_quick))
+        ends.append(descend(model, point, range(len(point))))
     return ends
 
 
@@ -251,7 +236,7 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
     wanted = computed.models.ranges
     residual = make_residual(cells, computed, seen)
     box = make_search_space([one.low for one in wanted], [one.high for one in wanted])
-    quick = UnitCubeResidual(residual, box)
+    quick = UnitCubeResidual(residual, box, is_expensive=True)
     rng = np.random.default_rng(SEED)
     random = 0
     ends = run_descents(
@@ -275,7 +260,6 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
             UnitCubeResidual(residual, box),
             [min(ends, key=lambda one: one.cost).u],
             before_descent=computed.reset_motions,
-            is_quick=False,
         )[0]
         best, others = group_valleys(
             cells, computed, seen, last, [(box.to_values(one.u), end_rms(one)) for one in ends]

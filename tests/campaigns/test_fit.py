@@ -265,7 +265,7 @@ def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
     result = run_successfully(*fit_command, "--free", free, "--hold", "cycle=2", "--json").content
     assert result == read_json(tmp_path / "out/fit.json")
     static = result["values"]["friction.static"]
-    assert static["interval"][0] < 0.31 < static["interval"][1]
+    assert static["low"] < 0.31 < static["high"]
     assert result["held"] == 24
     scene = load(tmp_path / "out/scene.fitted.toml")
     assert scene.friction.static == static["value"] and scene.slide.file == "../loop.csv"

@@ -84,8 +84,8 @@ def test_exact_value_at_bound_has_profile_interval():
     assert fit.intervals.ends[1] == pytest.approx(
         [0.3, upper_end], rel=2e-3
     ) and fit.intervals.open_ends[1].tolist() == [True, False]
-    assert describe_fit(fit, ["a", "b"]) == [
-        "b is at its low bound 0.3: widen the range, or try another law"
+    assert describe_fit(fit, ["a", "b"], [("0", "3"), ("0.3 um", "5 um")]) == [
+        "b is at its low bound 0.3 um: widen the range, or try another law"
     ]
     change = 0.02 * np.cos(3 * LINE)
     shift = np.abs(solve_linear(design, data + change)[0] - values)[1]
@@ -208,12 +208,12 @@ def test_always_isolated_start_is_not_converged():
 
 def test_always_lower_end_that_no_start_reached_is_not_converged(monkeypatch):
     """Two starts with the same end do not confirm the lower end of an unfinished last descent."""
-    problem = Problem(lambda v: v[0] - np.array([1.0, 1.1]), [0.0], [1.0])
+    problem = Problem(lambda v: v[0] - np.array([1.0, 1.1]), [0.0], [1.0], is_expensive=True)
     for cost, outcome in ((9.0, Outcome.NOT_CONVERGED), (2.21, Outcome.DONE)):
         ends = [least_squares.Descent(np.array([0.0]), one, False, 2) for one in (cost, cost, 2.21)]
         following = iter(ends)
         monkeypatch.setattr(least_squares, "descend", lambda *_, ends=following, **__: next(ends))
-        assert problem.search(2, is_quick=True).outcome is outcome
+        assert problem.search(2).outcome is outcome
 
 
 def test_refuses_unsolvable_fits():
@@ -266,7 +266,7 @@ def test_exact_counts_contain_every_evaluation():
 
     bounds = ([-5] * 3, [5] * 3)
     first = Problem(residual, *bounds).search(4)
-    second = Problem(residual, *bounds, earlier=first).solve(1)
+    second = Problem(residual, *bounds, first).solve(1)
     assert second.counts.evaluations == len(calls)
     assert second.n_best == first.n_best == 4
     assert second.counts.failures == sum(values[0] > 4 for values in calls) > 0

@@ -22,7 +22,7 @@ from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
 from ..backbone.records import CURVE_METHODS
 from ..backbone.words import describe_span
-from .problem import SILENT_LISTENER, Comparison, FittedKeys, FreeKeys, Listener
+from .problem import Comparison, FittedKeys, FreeKeys
 
 # Factors to SI by unit, for each column of a measured curve
 CURVE_UNITS = {
@@ -36,8 +36,8 @@ FITTED_NAMES = ("frequency", "damping")  # rows of the values of a measured curv
 # First error, relative to the value, of a quantity without a column of errors; the scatter replaces it.
 FIRST_ASSUMED_RELATIVE_ERROR = 5e-2
 MAX_REWEIGHTINGS = 8  # largest number of fits by a method in which the scatter replaces the errors
-# Relative change of an assumed error from one fit to the next below which it is known
-SAME_ERROR_TOL = 0.1
+# Relative change of an assumed error from one fit to the next below which it is known; it hardly changes the weights
+SAME_ERROR_TOL = 0.01
 # Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_RELATIVE_DEVIATION = 1e-6
 # Largest relative difference of a measured amplitude and that of its computed point.
@@ -62,8 +62,6 @@ class CurveComparison(Comparison):
         CSV file that `import --decay` or `backbone` wrote, or one with the header CURVE_HEADER.
     ranges : sequence of Range
         Bounds of the free keys.
-    listener : Listener
-        Not used.
 
     Raises
     ------
@@ -75,13 +73,7 @@ class CurveComparison(Comparison):
     values_name = "values"
     interval_kind = IntervalKind.SERIES
 
-    def __init__(
-        self,
-        scene: Scene,
-        path: Path,
-        ranges: Sequence[Range],
-        listener: Listener = SILENT_LISTENER,
-    ):
+    def __init__(self, scene: Scene, path: Path, ranges: Sequence[Range]):
         # names may have the prefix "decay_"
         units = {}
         for name, unit in CURVE_UNITS.items():
@@ -152,9 +144,9 @@ class CurveComparison(Comparison):
         """Replace assumed errors by the scatter around the fit, then the fast method by the reference method."""
         self.n_reweightings += 1
         if self.is_assumed.any() and self.n_reweightings <= MAX_REWEIGHTINGS:
-            before = self.deviation
-            self.deviation = self.estimate_deviation(self.compute(values), training)
-            if np.abs(np.log(self.deviation / before)).max() >= SAME_ERROR_TOL:
+            deviation = self.estimate_deviation(self.compute(values), training)
+            if np.abs(np.log(deviation / self.deviation)).max() >= SAME_ERROR_TOL:
+                self.deviation = deviation
                 return True
         self.n_reweightings = 0
         reference = next(name for name in CURVE_METHODS if name not in self.reasons)

@@ -12,9 +12,9 @@ import numpy as np
 from ...convergence import convergence_error
 from ...core import PatchfemError
 from ...effects import law_has_trait
+from ...formatting import format_length
 from ...identify.intervals import IntervalKind
 from ...inputs.loops import Loop, read_loop
-from ...model.gap import find_shape_side
 from ...model.model import Model, build
 from ...model.source import locate_errors
 from ...runs.batch.meshes import SharedMeshes
@@ -23,7 +23,7 @@ from ...runs.bench.engine import choose_smooth_bond_summation
 from ...runs.patch.mesh_levels import solve_on_other_mesh
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
-from .problem import SILENT_LISTENER, Comparison, FittedKeys, FreeKeys, Listener, solve_contact
+from .problem import Comparison, FittedKeys, FreeKeys, solve_contact
 
 # Number of time steps between two rows at which the steps are not halved any more.
 MAX_STEPS_PER_ROW = 64
@@ -35,6 +35,8 @@ REST_SPEED_FRACTION = 1e-3
 MIN_INDEPENDENT_FRACTION = 0.6
 # Ratio of the residual to the peak force up to which round-off dominates the residual.
 MIN_RMS_OVER_PEAK = 1e-6
+# Ratio of the largest displacement of a record to that of the scene beyond which one of their units is doubtful
+MAX_STROKE_RATIO = 100
 # Largest ratio of the force in the first row to the peak force for a record that begins at rest.
 MAX_FIRST_FORCE_OVER_PEAK_FORCE = 0.2
 
@@ -50,8 +52,6 @@ class LoopComparison(Comparison):
         File of the measured loop.
     ranges : sequence of Range
         Bounds of the free keys.
-    listener : Listener
-        Told a line of text that reports the progress.
 
     Raises
     ------
@@ -61,13 +61,7 @@ class LoopComparison(Comparison):
 
     interval_kind = IntervalKind.SERIES
 
-    def __init__(
-        self,
-        scene: Scene,
-        path: Path,
-        ranges: Sequence[Range],
-        listener: Listener = SILENT_LISTENER,
-    ):
+    def __init__(self, scene: Scene, path: Path, ranges: Sequence[Range]):
         if scene.kind != "bench":
             raise SceneError(
                 [
@@ -88,19 +82,15 @@ class LoopComparison(Comparison):
 
         self.loop = loop
         self.time = time
-        self.say = listener.say
         law = scene.friction.law
         is_rigid = law_has_trait(law, "set-valued") and not law_has_trait(law, "averaged")
         # The force of elastic pieces does not jump where the speed does.
         contact = scene.contact
         is_elastic = contact is not None and bool(contact.compliance_key)
         self.is_discontinuous = (law_has_trait(law, "creeps") or is_rigid) and not is_elastic
-        self.is_exact = _is_step_independent(scene)
         steps = scene.accuracy.steps_per_cycle
-        self.has_fixed_steps = self.is_exact or steps is not None
-        self.steps_per_row = 1
-        if steps is not None and not self.is_exact:
-            self.steps_per_row = max(1, -(-steps // (loop.reading.size - 1)))
+        self.has_fixed_steps = steps is not None
+        self.steps_per_row = max(1, -(-(steps or 1) // (loop.reading.size - 1)))
         self.step_error = 0.0
         self.patch = None
         self.meshes = None
@@ -125,7 +115,7 @@ class LoopComparison(Comparison):
         displacement = np.interp(number, corner, self.loop.displacement)
         choice = choose_smooth_bond_summation(model, displacement)
         samples = (time, displacement, 0, 0.0)
-        run = run_bench(model, patch, 4, path=samples, choice=choice, say=self.say)
+        run = run_bench(model, patch, 4, path=samples, choice=choice, say=self.listener.say)
         if not run.load[0] > 0:
             raise PatchfemError(
                 "the normal load is 0 or less; give a load that presses the pieces together", ""
@@ -161,10 +151,8 @@ class LoopComparison(Comparison):
         return SharedMeshes(models)
 
     def measure_step_change(self, values: Sequence[float]) -> np.ndarray:
-        """Return the change (k,) of the computed reading when the time steps are halved; 0 if they have no effect."""
+        """Return the change (k,) of the computed reading when the time steps are halved."""
         coarse = self.compute(values)
-        if self.is_exact:
-            return np.zeros_like(coarse)
         self.steps_per_row *= 2
         fine = self.compute(values)
         self.steps_per_row //= 2
@@ -183,8 +171,10 @@ class LoopComparison(Comparison):
             if np.abs(self.measure_step_change(values)).max() <= limit * largest:
                 break
             self.steps_per_row *= 2
-            if self.say:
-                self.say(f"{self.steps_per_row} time steps between neighbouring rows of the record")
+            if self.listener.say:
+                self.listener.say(
+                    f"{self.steps_per_row} time steps between neighbouring rows of the record"
+                )
         return self.steps_per_row > first_steps
 
     def estimate_mesh_error(self, values: Sequence[float]) -> np.ndarray:
@@ -243,25 +233,20 @@ class LoopComparison(Comparison):
                 "hold out this cycle, as --hold cycle=1, or give a record that begins at rest"
             )
 
+        stroke = np.abs(self.loop.displacement).max()
+        own = scene.slide.amplitude
+        if own and not 1 / MAX_STROKE_RATIO < stroke / own < MAX_STROKE_RATIO:
+            warnings.append(
+                f"the record slides by {format_length(stroke, 2)}, but slide.amplitude is {format_length(own, 2)}: if this "
+                "is not meant, correct the unit in the header of the record"
+            )
+
         if self.step_error > scene.accuracy.tolerance * peak:
             warnings.append(
                 "if the time steps are halved, the force of the model changes by "
                 f"{self.step_error / peak:.1g} of its peak, more than the tolerance"
             )
         return warnings
-
-
-def _is_step_independent(scene: Scene) -> bool:
-    """Return whether the computed force of a scene at the rows does not depend on the time steps."""
-    law = scene.friction
-    contact = scene.contact
-    bonds = law_has_trait(law.law, "bonds")
-    is_closed_form = law.rest_growth is None and (law.reading == "report" or law.order == 1)
-    if bonds and not is_closed_form:
-        return False
-    if contact is None:
-        return True
-    return not (bonds and contact.compliance_key) and find_shape_side(contact) != "lower"
 
 
 def _find_row_times(scene: Scene, loop: Loop) -> tuple[np.ndarray, list[str]]:

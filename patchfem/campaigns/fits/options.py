@@ -11,17 +11,17 @@ from ...scene import refuse_removed
 class FitOptions:
     """Options of a fit, besides the keys that are fitted.
 
-    Each kind of fit refuses the options that it does not have.
+    A fit to a worn depth has none of them.
 
     Attributes
     ----------
     hold : sequence of str
-        Rows to predict without fitting them, such as "frequency=135 Hz,150 Hz"; for a loop or rows.
+        Rows to predict without fitting them, such as "frequency=135 Hz,150 Hz", "amplitude=2 um" or "cycle=1".
     leave_out : str
-        For rows: a column; each of its values is left out in turn.
+        Column; each of its values is left out in turn.
     starts : int or None
-        For rows or a curve of frequency and damping against amplitude: number of starting points of the search; the best
-        result is used. By default 8, or 6 for a curve.
+        Number of starting points of the search; the best result is used. By default 8 for rows of a rig, 6 for a curve of
+        frequency and damping against amplitude, 3 for a loop.
     """
 
     hold: Sequence[str] = ()

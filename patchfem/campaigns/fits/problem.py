@@ -122,8 +122,7 @@ class Comparison:
     labels : Mapping
         Columns by which rows can be held out, each with r cells.
     places : list of str
-        Words for the place of each value, such as "at 143 Hz", if it can be measured again; `parts` (r,) numbers the
-        quantities that are measured at a place.
+        Words for the place of each value, such as "at 143 Hz", if it can be measured again.
     interval_kind : str
         Assumption on the errors of the values.
     warnings, notes : list of str
@@ -132,6 +131,8 @@ class Comparison:
 
     # Number of starting points of a search unless the user gives it.
     default_starts = 3
+    # Told the progress.
+    listener = SILENT_LISTENER
     # What the values are called in messages.
     values_name = "rows"
     # Whether evaluations are so expensive that the first descents are quick.
@@ -145,7 +146,6 @@ class Comparison:
         self.deviation = np.ones(measured.shape)
         self.labels = labels
         self.places: list[str] = []
-        self.parts = np.zeros(measured.size)
         self.warnings: list[str] = []
         self.notes: list[str] = []
 
@@ -161,7 +161,7 @@ class Comparison:
         """Forget earlier results, so that an evaluation does not depend on those before it."""
 
     def refine(self, values: np.ndarray, training: np.ndarray) -> bool:
-        """Refine the model around fitted values (n,), and return whether the search has to go on.
+        """Refine the model around fitted values (n,), and return whether it has changed, so that the search goes on.
 
         `training` (r,) is the mask of the fitted rows.
         """
@@ -261,6 +261,7 @@ def fit_keys(
         If the model cannot be computed at any starting point.
     """
     begin = perf_counter()
+    comparison.listener = listener
     held_out = np.zeros(comparison.measured.size, bool)
     for selector in options.hold:
         held_out |= select_held_out(selector, comparison.path, comparison.labels)
@@ -281,23 +282,8 @@ def fit_keys(
         if listener.progress is not None:
             listener.progress(min(n_finished / (n_starts * (1 + len(groups))), 1.0))
 
-    search = {"is_quick": comparison.is_expensive, "report": report}
-
-    # The fit to all rows that are not held out. Where the model is refined, the search goes on with it.
     training = ~held_out
-    fit = None
-    for _ in range(MAX_REFINEMENTS):
-        problem = _make_problem(comparison, training, fit)
-        try:
-            fit = problem.search(n_starts if fit is None else 1, **search)
-        except NotConverged as reason:
-            comparison.replace_failed_model(reason)
-            continue
-        if not comparison.refine(fit.values, training):
-            break
-    else:
-        fit = replace(fit, outcome=Outcome.NOT_CONVERGED)
-    fit = problem.add_intervals(fit, comparison.interval_kind)
+    fit = _search_minimum(comparison, training, n_starts, report)
     changes = comparison.estimate_changes(fit.values)
     fit = fit.widen(changes[:, training], comparison.keys.bounds)
 
@@ -306,7 +292,7 @@ def fit_keys(
     computed = comparison.compute(fit.values, np.ones_like(held_out))
     left_out = np.full(held_out.size, np.nan)
     for group in groups:
-        fold = _make_problem(comparison, training & ~group).search(n_starts, **search)
+        fold = _make_problem(comparison, training & ~group).search(n_starts, report)
         comparison.forget_motions()
         left_out[group] = comparison.compute(fold.values, group)[group]
 
@@ -319,6 +305,42 @@ def fit_keys(
     )
 
 
+def _search_minimum(
+    comparison: Comparison, training: np.ndarray, n_starts: int, report: Callable[[], None]
+) -> Fit:
+    """Fit the rows in a mask (r,) from some starting points, and refine the model until the fit does not change.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Measurement and model.
+    training : (r,) bool
+        Mask of the fitted rows.
+    n_starts : int
+        Number of starting points.
+    report : callable
+        Called after each descent.
+
+    Returns
+    -------
+    Fit
+        With intervals that contain the errors of the data.
+    """
+    fit = None
+    for _ in range(MAX_REFINEMENTS):
+        problem = _make_problem(comparison, training, fit)
+        try:
+            fit = problem.search(n_starts if fit is None else 1, report)
+        except NotConverged as reason:
+            comparison.replace_failed_model(reason)
+            continue
+        if not comparison.refine(fit.values, training):
+            break
+    else:
+        fit = replace(fit, outcome=Outcome.NOT_CONVERGED)
+    return problem.add_intervals(fit, comparison.interval_kind)
+
+
 def _make_problem(
     comparison: Comparison, training: np.ndarray, earlier: Fit | None = None
 ) -> Problem:
@@ -329,7 +351,13 @@ def _make_problem(
         return comparison.compare(comparison.compute(values, training))[training]
 
     keys = comparison.keys
-    return Problem(residual, *keys.bounds.T, keys.start(), earlier, comparison.forget_motions)
+    return Problem(
+        residual,
+        *keys.bounds.T,
+        earlier or keys.start(),
+        comparison.forget_motions,
+        is_expensive=comparison.is_expensive,
+    )
 
 
 def _require_enough_values(comparison: Comparison, count: int) -> None:
@@ -346,7 +374,8 @@ def _collect_warnings(fitted: FittedKeys) -> list[str]:
     """Return the warnings about a fit: of its scene, its search, its kind, and of a bolted joint."""
     keys = fitted.keys
     comparison = fitted.comparison
-    undetermined = describe_fit(fitted.fit, keys.names)
+    bounds = [bound.format_values((0, 1)) for bound in keys.ranges]
+    undetermined = describe_fit(fitted.fit, keys.names, bounds)
     own = [*comparison.warnings, *comparison.find_warnings(fitted)]
     return [*keys.scene.remarks, *undetermined, *own, *warn_of_bolted_joint(keys)]
 
@@ -354,21 +383,17 @@ def _collect_warnings(fitted: FittedKeys) -> list[str]:
 def _advise_repetition(fitted: FittedKeys) -> list[str]:
     """Return a list with a sentence on the place whose repeated measurement would narrow an interval most, if any.
 
-    The information of a repetition is the sum of g g^T over its quantities, with the change g of a residual per key.
+    The information of a repetition is the sum of g g^T over its values, with the change g of a residual per key.
     """
     comparison = fitted.comparison
     if not comparison.places:
         return []
     training = ~fitted.held_out
     names = np.array(comparison.places)[training]
-    parts = comparison.parts[training]
     places = list(dict.fromkeys(names.tolist()))
     effects = fitted.fit.intervals.effects
-    information = np.zeros((len(places), effects.shape[1], effects.shape[1]))
-    for k, place in enumerate(places):
-        for part in set(parts[names == place].tolist()):
-            gradient = effects[(names == place) & (parts == part)].mean(axis=0)
-            information[k] += np.outer(gradient, gradient)
+    gradients = [effects[names == place] for place in places]
+    information = np.array([gradient.T @ gradient for gradient in gradients])
     advice = advise_test(fitted.fit, fitted.keys.names, information, places)
     return [advice] if advice else []
 

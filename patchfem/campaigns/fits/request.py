@@ -62,7 +62,7 @@ def fit_measurement(
     check_options(kind, options)
     if not to or not ranges:
         raise PatchfemError("--to MEASURED and --free KEYS are needed")
-    comparison = COMPARISONS[kind](scene, to, ranges, listener)
+    comparison = COMPARISONS[kind](scene, to, ranges)
     return fit_keys(comparison, options, listener)
 
 

@@ -15,7 +15,7 @@ from ...scene.scene import Scene
 from ..rows.cells import MAX_LOG_RATIO, compute_rms_scores, read_response_table
 from ..rows.condition_models import ConditionModels
 from ..rows.model_readings import ModelReadings
-from .problem import SILENT_LISTENER, Comparison, FittedKeys, Listener
+from .problem import Comparison, FittedKeys
 
 
 class RowsComparison(Comparison):
@@ -29,8 +29,6 @@ class RowsComparison(Comparison):
         File of the table.
     ranges : sequence of Range
         Bounds of the free keys.
-    listener : Listener
-        Told before code is compiled.
 
     Raises
     ------
@@ -42,25 +40,19 @@ class RowsComparison(Comparison):
     values_name = "readings"
     is_expensive = True
 
-    def __init__(
-        self,
-        scene: Scene,
-        path: Path,
-        ranges: Sequence[Range],
-        listener: Listener = SILENT_LISTENER,
-    ):
+    def __init__(self, scene: Scene, path: Path, ranges: Sequence[Range]):
         self.cells = read_response_table(path)
         models = ConditionModels(scene, self.cells.conditions, ranges, Path(path))
         super().__init__(models, path, self.cells.measured, self.cells.columns)
         self.instrument = models.instrument
         self.warnings += models.notes
-        self.readings = ModelReadings(models, listener.say)
+        self.readings = ModelReadings(models)
         places = [f"at {f:.6g} Hz and {level / G_N:.4g} g" for f, level in self.cells.conditions]
         self.places = [places[k] for k in self.cells.condition]
-        self.parts = self.cells.is_acceleration
 
     def compute(self, values: Sequence[float], needed: np.ndarray) -> np.ndarray:
         """Compute the readings (n,) for values of the keys; those at conditions that are not needed are NaN."""
+        self.readings.say = self.listener.say
         conditions = sorted(set(self.cells.condition[needed].tolist()))
         return self.cells.select_computed(*self.readings(values, conditions))
 

@@ -23,7 +23,7 @@ from ...runs.wear import evolve
 from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
 from ...scene.scene import Scene
-from .problem import SILENT_LISTENER, Comparison, FittedKeys, FreeKeys, Listener
+from .problem import Comparison, FittedKeys, FreeKeys
 
 MAX_WORN_DEPTH_NAME = "worn_depth_max"
 # Names of the wear depths in compare.json, the more accurate one first.
@@ -133,8 +133,6 @@ class DepthComparison(Comparison):
         Measured depth, in the format of `read_measured_depth`.
     ranges : sequence of Range
         Bounds of the coefficient alone.
-    listener : Listener
-        Told the completed fraction of a run.
 
     Raises
     ------
@@ -145,13 +143,7 @@ class DepthComparison(Comparison):
     default_starts = 1
     interval_kind = IntervalKind.KNOWN
 
-    def __init__(
-        self,
-        scene: Scene,
-        path: str,
-        ranges: Sequence[Range],
-        listener: Listener = SILENT_LISTENER,
-    ):
+    def __init__(self, scene: Scene, path: str, ranges: Sequence[Range]):
         if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
             raise PatchfemError(
                 f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example "
@@ -159,7 +151,6 @@ class DepthComparison(Comparison):
             )
         self.depth = depth = read_measured_depth(path)
         super().__init__(FreeKeys(scene, ranges), depth.source, np.array([depth.value]), {})
-        self.progress = listener.progress
 
         # The measured depth needs a patch without earlier wear.
         low, high = self.keys.bounds[0]
@@ -192,7 +183,7 @@ class DepthComparison(Comparison):
     def _compute_curve(self, coefficient: float) -> np.ndarray:
         """Compute coefficients [m2/N] up to a given one, and the depths [m] with them (2, j), from the course of one run."""
         model = self.keys.build_model([coefficient])
-        worn = evolve.compute_wear(model, self.patch, (None, None), self.progress)
+        worn = evolve.compute_wear(model, self.patch, (None, None), self.listener.progress)
         if worn.stopped:
             raise PatchfemError(f"fit {COEFFICIENT_KEY}: {worn.stopped}")
         area = self.patch.pieces.interface.weight.ravel()
@@ -216,9 +207,11 @@ class DepthComparison(Comparison):
         """Correct the curve by a run with the fitted coefficient, and return whether the depth has changed."""
         depth = self._compute_curve(values[0])[1, -1]
         correction = float(depth / self.compute(values, training)[0])
-        self.factor *= correction
         tolerance = MAX_DEPTH_ERROR_OVER_TOLERANCE * self.keys.scene.accuracy.tolerance
-        return abs(correction - 1) > tolerance
+        if abs(correction - 1) <= tolerance:
+            return False
+        self.factor *= correction
+        return True
 
     def estimate_changes(self, values: np.ndarray) -> np.ndarray:
         """Return the distance (1, 1) of the exact depth with a coefficient from the computed one, as a residual.
@@ -227,7 +220,7 @@ class DepthComparison(Comparison):
         """
         self.error = None
         try:
-            measures = run(self.keys.build_model(values), progress=self.progress).measures
+            measures = run(self.keys.build_model(values), progress=self.listener.progress).measures
         except (NotConverged, Missing):
             measures = {}
         # The mean depth is the worn volume over the area.
@@ -241,8 +234,8 @@ class DepthComparison(Comparison):
             return np.zeros((0, 1))
         area = 1.0 if is_max else float(self.patch.pieces.interface.weight.sum())
         self.error = abs(measure.value / area - self.measured[0]) + measure.error / area
-        slope = np.ptp(self.compare(self.measured * np.array([1 - 1e-6, 1 + 1e-6]))) / 2e-6
-        return np.array([[self.error * slope / self.measured[0]]])
+        ends = self.compare(self.measured + self.error * np.array([-1, 1]))
+        return np.array([[np.ptp(ends) / 2]])
 
     def find_warnings(self, fitted: FittedKeys) -> list[str]:
         """Return a warning about a depth that is given without an interval."""
