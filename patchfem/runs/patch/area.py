@@ -18,7 +18,7 @@ from ...elasticity.sides import BlockShape
 from ...model.face import compute_face_gap
 from ...model.patch import PatchModel
 from ...model.pieces import make_layer_stacks
-from ...response.coarser import face_errors
+from ...response.errors import face_errors
 from ..results.patch_rows import CELLS_SOURCE, Values, make_measure
 from . import store
 from .measures import (

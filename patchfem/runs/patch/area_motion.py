@@ -10,7 +10,7 @@ import numpy as np
 
 from ...effects import law_has_trait
 from ...friction.record import make_law
-from ...response.coarser import face_errors
+from ...response.errors import face_errors
 from ...slip import first_loading
 from ..results.patch_rows import CELLS_SOURCE, make_measure
 from . import jenkins_elements, store
