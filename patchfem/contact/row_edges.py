@@ -44,11 +44,12 @@ def find_row_edges(compliance: CellCompliance, pressure, gap, pressure_rate) -> 
 
 
 def compute_row_stiffness(compliance: CellCompliance, active, motion, edges: ContactEdges) -> float:
-    """Compute the stiffness of a contact whose edges may lie between the cells of a row.
+    """Compute the stiffness of a row of cells in contact, with the edges of the contact at any place between cells.
 
-    Each edge adds the change along the parabola through the set with one cell less and one more (`contact.edges`). The
-    compliances of these cells are taken from the edge of the longest contact, because they are the same at all edges
-    but those of the shortest contacts.
+    The stiffness of whole cells is interpolated to the place of each edge by the parabola through three contact sets: the
+    set itself, the set without its last cell, and the set with one more cell (`contact.edges`). The compliances for this
+    correction are computed once, at the edge of the longest contact, and used at all edges. For contacts of a few cells
+    this is an approximation.
 
     Parameters
     ----------

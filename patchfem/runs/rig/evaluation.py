@@ -588,6 +588,11 @@ class RunEvaluator:
         if self.has_friction:
             fields |= {"reversal_rule": reversal_force_rule(model), "ledger": ledger}
 
+        if model.rig.drive.kind == "free":
+            # The last whole cycle of a release may begin before the window.
+            motion = (run.response.time, run.response.output, run.response.output_rate)
+            fields["release"] = measure_last_cycle_amplitude(*motion, drive.period)
+
         # What the engine knows better replaces what follows from samples.
         fields |= self.describe_cycles(run, drive, stuck=stuck)
         window = fields["window"]
@@ -600,17 +605,7 @@ class RunEvaluator:
             is_sine=is_sinusoidal(drive),
             **fields,
         )
-
-        values = compute_measures(last_cycles)
-
-        # The amplitude of a decay is that of its last complete cycle, not of the whole window.
-        if model.rig.drive.kind == "free":
-            # It may begin before the window.
-            motion = (run.response.time, run.response.output, run.response.output_rate)
-            amplitude = measure_last_cycle_amplitude(*motion, drive.period)
-            if amplitude is not None:
-                values[AMPLITUDE] = amplitude
-        return values
+        return compute_measures(last_cycles)
 
     def is_stuck(self, run) -> bool:
         """Return whether no interface or band slips in the last cycles by more than `stick_tolerance` [m].
@@ -624,10 +619,9 @@ class RunEvaluator:
     def make_solution(self, run, seconds: float, drive=None, **other_fields) -> Solution:
         """Evaluate a run and return its Solution.
 
-        Measures follow from the last `numerics.window` cycles. The amplitude is half the difference of the largest and the
-        smallest output of these cycles, except for a release: that of its last whole cycle. `run_errors` are the errors
-        that the run itself shows: of sampling, and those of its engine. Errors due to steps and mesh need coarse runs and
-        are not part of it.
+        Measures follow from the last `numerics.window` cycles (`response.rows`). `run_errors` are the errors that the run
+        itself shows: of sampling, and those of its engine. Errors due to steps and mesh need coarse runs and are not part
+        of it.
 
         Parameters
         ----------

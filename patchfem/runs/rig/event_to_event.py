@@ -30,7 +30,7 @@ from ...response.events import (
     sort_events,
 )
 from ...response.measures import Values
-from ...response.rows import find_definition, select_names
+from ...response.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
 from . import bands, engines
@@ -362,6 +362,8 @@ class LumpedEvaluator(RunEvaluator):
         }
         if not is_sinusoidal(drive):
             values |= dict.fromkeys(select_names("sine"))
+        if self.model.rig.drive.kind == "free":
+            del values[AMPLITUDE]  # The engine knows that of the window; see its row in the table.
         window = run.window
         if not self.has_friction:
             values |= dict.fromkeys(select_names("run"))
