@@ -350,7 +350,7 @@ class Measure:
     - reason: reason why the value or its error is None.
     - engine: method that computed the value; "" for the engine of the run.
     - parts: contribution to the error of each discretisation, such as "steps" or "mesh", from coarser runs
-      (`response.coarser`); None if they are unknown.
+      (`response.errors`); None if they are unknown.
     """
 
     value: float | None

@@ -8,7 +8,7 @@ from ..effects import law_has_trait
 from ..model.model import Model
 from ..runs.bench import engine
 from ..runs.plan import plan
-from ..runs.rig import numerics
+from ..runs.rig import engines
 from ..scene.keys.contact import MAX_AREA_CELLS, MIN_AREA_CELLS
 from ..scene.rules.accuracy import has_effect
 
@@ -136,7 +136,7 @@ def _find_count(model: Model, name: str) -> int:
     if name == "steps_per_cycle":
         if model.kind == "bench":
             return engine.steps_per_cycle(model)
-        return numerics.choose_numerics(model).steps
+        return engines.choose_numerics(model).steps
     if name == "cells":
         return model.patch.area.cells or DEFAULT_CELLS
     return getattr(model.wear if name == "jumps" else model.accuracy, name) or DEFAULT_MIDDLE_COUNT

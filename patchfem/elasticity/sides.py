@@ -56,7 +56,7 @@ class LayerStack(NamedTuple):
 
 
 def make_stack(height: float, thickness: float, layers: Layers) -> LayerStack:
-    """Return the layers of a coated piece whose far face is held.
+    """Return thickness and Lame constants of the layers of a piece, from its interface to its fixed far face.
 
     Parameters
     ----------

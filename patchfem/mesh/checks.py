@@ -49,7 +49,7 @@ class TaggedMesh(NamedTuple):
     tag_help: str
 
     def select(self, kinds, *tags: str) -> list[TaggedBlock]:
-        """Return the cells with one of the tags, block by block: only plane elements, or only lines and vertices.
+        """Return the cells of some kinds that have one of the tags, as one TaggedBlock per block of the file.
 
         `kinds` is `ELEMENTS` for the plane elements, and None for lines and vertices.
         """

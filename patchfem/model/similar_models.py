@@ -55,7 +55,7 @@ class SimilarModels(Sequence):
         return replace_numbers(self.first, self.plain_numbers, self.values[index].tolist(), sets)
 
     def select(self, indices: np.ndarray) -> SimilarModels:
-        """Select the models with given indices."""
+        """Return the models with the given indices."""
         return replace(self, values=self.values[indices], cases=self.cases[indices])
 
     def columns(self) -> Model:

@@ -8,13 +8,6 @@ functions that evaluate samples.
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "coarser": (
-        "CoarserRuns",
-        "edge_errors",
-        "estimate_errors",
-        "list_step_runs",
-        "second_order_errors",
-    ),
     "decay_curve": (
         "DecayCurve",
         "HalfCycles",
@@ -26,14 +19,19 @@ PUBLIC = {
         "smooth_slopes",
     ),
     "errors": (
+        "CoarserRuns",
         "ERROR_MEASURES",
         "absolute_change",
         "add_errors",
         "add_run_error_estimates",
         "convergence_errors",
+        "estimate_errors",
         "estimate_sampling_errors",
+        "edge_errors",
         "finer_errors",
         "friction_errors",
+        "list_step_runs",
+        "second_order_errors",
         "total_error",
     ),
     "events": (
@@ -41,9 +39,11 @@ PUBLIC = {
         "Events",
         "SEGMENT_BORDER",
         "classify_changes",
+        "compute_stuck_vibration",
         "find_segment_borders",
         "is_all_stuck",
         "join_events",
+        "select_strongest",
         "sort_events",
     ),
     "levels": (
@@ -86,10 +86,6 @@ PUBLIC = {
         "find_invalid",
         "find_missing",
         "find_missing_unbounded",
-    ),
-    "ringing": (
-        "compute_stuck_vibration",
-        "select_strongest",
     ),
     "rows": (
         "AMPLITUDE",

@@ -55,6 +55,7 @@ class LastCycles:
       `loops.find_reversals`).
     - slide_round_off: largest half range of the relative displacement that is round-off [m].
     - is_single_interface: whether the columns `slides` of the window are bands of a single interface.
+    - release: amplitude of the last whole cycle of a release [m]; None for other drives and without such a cycle.
     """
 
     window: Response
@@ -70,6 +71,7 @@ class LastCycles:
     reversal_rule: str = "rate"
     slide_round_off: float = 0.0
     is_single_interface: bool = False
+    release: float | None = None
 
     @cached_property
     def span(self) -> float:
@@ -251,7 +253,7 @@ MOTION_MEASURE_ROWS = (
         "the base; of a release, that of the last whole cycle of the "
         "motion, from a reversal to the second reversal after it, without "
         "ripples below a quarter of the range in the last period",
-        lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2,
+        lambda s: np.ptp(s.extremes) / 2 if s.release is None else s.release,
         flags="main level curve displacement",
     ),
     MeasureDefinition(

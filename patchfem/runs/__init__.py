@@ -11,15 +11,13 @@ it:
 5.  `joint`  removal of a joint from modes that were measured with it
 6.  `rig`  a driven structure with friction
 7.  `wear`  wear of a patch in a bench or a rig over many cycles
-8.  `findings`  measures that miss the tolerance, and the advice that reduces their errors
+8.  `findings`  measures that miss the tolerance, the advice that reduces their errors, and balances
 9.  `accuracy_curve`  accuracy of a motion against its computing time
-10. `plan`  what would run: engine, unknowns, stiffnesses
-11. `memory`  the memory of a run, and the memory that it may use
-12. `balances`  equilibrium of a patch and energy of a bench
-13. `run`  from a plan to its result
-14. `probe`  one run without error estimates, with its measured time
-15. `pieces`  displacement and stress inside both pieces, and where they yield
-16. `batch`  many models in one batch
+10. `plan`  what would run: engine, unknowns, stiffnesses, memory
+11. `run`  from a plan to its result
+12. `probe`  one run without error estimates, with its measured time
+13. `pieces`  displacement and stress inside both pieces, and where they yield
+14. `batch`  many models in one batch
 """
 
 # names that other folders use, by module
@@ -84,9 +82,9 @@ PUBLIC = {
     ),
     "rig.engines": (
         "ENGINES",
+        "choose_numerics",
         "find_obstacle_of_map",
     ),
-    "rig.numerics": ("choose_numerics",),
     "rig.plan": (
         "find_drive_and_knee",
         "stuck_stiffnesses",

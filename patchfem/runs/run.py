@@ -18,13 +18,12 @@ from ..core import Measure, Missing, NotConverged, Outcome
 from ..cost_model import measure_cpu_time
 from ..model.model import Model
 from ..model.source import locate_errors
-from . import joint, memory, refine
-from .balances import mark_unbalanced
+from . import joint, refine
 from .bench import result as bench_result
-from .findings import find_missed_measures
+from .findings import find_missed_measures, mark_unbalanced
 from .patch import area_motion, faces, mesh_levels, store, strength
 from .patch import result as patch_result
-from .plan import Plan, plan
+from .plan import Plan, plan, refuse_insufficient_memory
 from .results.interfaces import Face, merge_sentences
 from .results.patch_rows import Measures, find_unknown_measures
 from .results.result import Result, RunInputs, describe_measure, shorten_file_names
@@ -102,7 +101,7 @@ def run(
     """
     runnable = runnable if isinstance(runnable, Plan) else plan(runnable)
     with locate_errors(runnable.model.source):
-        memory.refuse_insufficient_memory(runnable, say)
+        refuse_insufficient_memory(runnable, say)
         if fresh:
             store.clear_cache()
 

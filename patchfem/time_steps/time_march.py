@@ -120,7 +120,7 @@ class Motion:
 
 
 def load_kernels(contact: Contact, say=None):
-    """Return the compiled march with the parts that a contact needs: lists of bonds, contact sets.
+    """Return the compiled march for a contact; code for lists of bonds and contact sets is compiled only if it has them.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.runs.rig.steady.curve_points import sample_adaptively
+from patchfem.runs.rig.steady.curves import sample_adaptively
 
 
 def magnification(f, zeta):

@@ -18,7 +18,7 @@ from scene_texts import (
 
 from patchfem import plan
 from patchfem.core import Missing
-from patchfem.runs import memory
+from patchfem.runs import plan as memory
 from patchfem.scene import loads
 
 TANH = COULOMB.replace("coulomb", "tanh") + 'reference_speed = "1 mm/s"\n'
@@ -83,7 +83,7 @@ def test_exact_memory_of_drive_and_modes(tmp_path):
 DRIVE_REMEDY = "give fewer rows in drive.file, or lower drive.duration"
 
 
-def _find_largest(scene) -> memory.MemoryPart:
+def _find_largest(scene):
     """Return the largest contribution that the scene determines."""
     return next(part for part in memory.list_parts(plan(scene)) if part.remedy)
 

@@ -8,8 +8,8 @@ from scene_runs import run_scene
 from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT
 
 from patchfem.core import Outcome
-from patchfem.runs.balances import mark_unbalanced
 from patchfem.runs.bench import bench
+from patchfem.runs.findings import mark_unbalanced
 from patchfem.time_steps import time_march
 
 SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "170 Hz"\ndamping = 0.01\nslide = 0.4\noutput = 0.7\nbase = 0.3\n'

@@ -107,7 +107,7 @@ def max_yield_displacement(force: float, stiffness: float, chi: float, beta: flo
 def slider_cells(
     force: float, stiffness: float, chi: float, beta: float, n_cells: int = N_SLIDER_CELLS
 ) -> Sliders:
-    """Return sliders that represent the cells of the power law, followed by the slider that yields last.
+    """Return the spring-slider elements of an Iwan model: one per cell of its power law, and the one that yields last.
 
     Each cell keeps the stiffness and the slip force of its part of the density, so the sums over all cells are exact, as
     is the force of first loading at every border of a cell. The width of the cells follows the square root of the

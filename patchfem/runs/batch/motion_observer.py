@@ -12,9 +12,8 @@ from functools import cached_property
 
 from ...core import NotConverged
 from ..results.result import UNBOUNDED_OUTCOMES
-from ..rig.engines import ENGINES
-from ..rig.numerics import choose_numerics
-from ..rig.solve import solve_rig
+from ..rig.engines import ENGINES, choose_numerics
+from ..rig.rig import solve_rig
 from ..rig.steady.curves import COLUMN_MEASURES, ObservedMotion
 from ..rig.steady.shooting import ShootingFinder
 

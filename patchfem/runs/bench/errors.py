@@ -13,15 +13,17 @@ import numpy as np
 from ... import slip
 from ...effects import law_has_trait
 from ...friction.bonds import engines as bond_engines
-from ...response.coarser import (
+from ...response.errors import (
     CoarserRuns,
     StepRun,
+    convergence_errors,
     edge_errors,
     estimate_errors,
+    finer_errors,
+    friction_errors,
     list_step_runs,
     second_order_errors,
 )
-from ...response.errors import convergence_errors, finer_errors, friction_errors
 from ..results.patch_rows import Values
 from . import bench
 from .engine import CONTACT_POINTS, uses_parallel_elements
@@ -54,7 +56,7 @@ class BenchErrors(NamedTuple):
     """Error estimates of the measures of a bench run.
 
     - errors: pairs of the coarsened discretization and the errors by measure, see
-      `coarser.estimate_errors`.
+      `estimate_errors`.
     - seconds: CPU time of the coarser runs [s].
     - step_runs: StepRun of the run and of each run with fewer steps, from fine to coarse.
     """

@@ -12,6 +12,7 @@ from ...formatting import format_quantity
 from ...response.errors import add_errors
 from ...response.outcome import OPEN_LOOP_MESSAGE, remove_errors
 from ...response.rows import set_final_floors
+from ..results.interfaces import check_pieces_overlap, warn_of_large_slide
 from ..results.notes import LawFacts, list_law_notes, list_law_warnings
 from ..results.result import (
     N_INTERFACE_FRAMES,
@@ -22,7 +23,6 @@ from ..results.result import (
     SlipRule,
     make_interface_frames,
 )
-from ..results.travel import check_pieces_overlap, warn_of_large_slide
 from . import bench
 from .engine import nodal_element_limit, steps_per_cycle
 from .errors import BenchErrors, estimate_bench_errors

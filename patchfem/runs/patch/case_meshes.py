@@ -72,7 +72,7 @@ def find_contact_places(pressed: PressedCases) -> ContactPlaces:
 
 
 def find_outer_nodes(pressed: PressedCases) -> np.ndarray:
-    """Return the positions (n, 2) [m] of the first and the last node in contact."""
+    """Return the positions [m] of the first and the last node in contact, (n, 2) for n cases."""
     active = pressed.active
     last = active.shape[1] - 1 - active[:, ::-1].argmax(axis=1)
     return pressed.x[np.stack([active.argmax(axis=1), last], axis=1)]
@@ -154,7 +154,7 @@ class _CaseSolver:
         )  # positions [m] of the first and last node in contact
 
     def solve(self, numbers: np.ndarray) -> None:
-        """Solve some cases (k,) on common meshes, and those that miss the tolerance on meshes of their own."""
+        """Solve the cases `numbers` (k,) on common meshes, and those that miss the tolerance in smaller groups."""
         if numbers.size < 2:
             for number in numbers.tolist():
                 self.solve_alone(number)

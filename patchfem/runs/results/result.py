@@ -189,7 +189,7 @@ class MotionData(NamedTuple):
 
     - period: period of the drive [s].
     - energies: energies [J] and counters by name.
-    - step_runs: `coarser.StepRun` of the run and of its runs with fewer steps, from fine to coarse.
+    - step_runs: `errors.StepRun` of the run and of its runs with fewer steps, from fine to coarse.
     - levels: `levels.Level` of each drive level.
     - events: stick-slip Events.
     - decay: DecayCurve of a release.

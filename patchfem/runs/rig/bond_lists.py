@@ -16,7 +16,7 @@ from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ..bench import engine as bench_engine
 from ..bench.contact_points import sums_over_lists
-from .numerics import Numerics
+from .engines import Numerics
 
 # Ratio of the stroke that bond summation has to resolve to the first stroke of a released motion.
 DECAYED_STROKE_RATIO = 1e-2

@@ -17,7 +17,6 @@ from ...convergence import MAX_CONVERGENCE_ORDER, convergence_error
 from ...core import NotConverged, PatchfemError
 from ...hybrid import quasi_static
 from ...hybrid.cases import UndrivenRig
-from ...response.coarser import ComparisonRuns
 from ...response.decay_curve import (
     MIN_HALF_CYCLE_RATIO,
     DecayCurve,
@@ -25,10 +24,11 @@ from ...response.decay_curve import (
     locate_reversals,
     make_half_cycles,
 )
+from ...response.errors import ComparisonRuns
 from ...slip.mesh_correction import spread_elements
 from ..patch import faces
-from . import joints, numerics
-from .solution import Solution
+from . import engines, joints
+from .evaluation import Solution
 
 CONTACTS_WITHOUT_STATIC_CURVE = (
     "the contact slides on grooves",
@@ -113,7 +113,7 @@ def make_laws_on_mesh(model, patch, meshed=()) -> UndrivenRig:
     PatchfemError
         If a law has no steady loop.
     """
-    settings = numerics.choose_numerics(with_automatic_method(model))
+    settings = engines.choose_numerics(with_automatic_method(model))
     return joints.make_undriven_rig(model, replace(settings, meshed=meshed), patch)
 
 

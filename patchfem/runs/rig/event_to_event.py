@@ -24,25 +24,29 @@ from ...response.events import (
     SEGMENT_BORDER,
     Events,
     classify_changes,
+    compute_stuck_vibration,
     find_segment_borders,
+    select_strongest,
     sort_events,
 )
 from ...response.measures import Values
-from ...response.ringing import compute_stuck_vibration, select_strongest
-from ...response.rows import find_definition, select_names
+from ...response.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
 from . import bands, engines
-from .evaluation import EngineRun, RunEvaluator, compute_sampled_work, compute_work_check
-from .joints import Joints, make_joints
-from .solution import (
+from .evaluation import (
+    EngineRun,
     Fields,
+    RunEvaluator,
     Solution,
     compute_sampled_loop,
+    compute_sampled_work,
+    compute_work_check,
     describe_escape,
     find_travel,
     first_mode_stiffness,
 )
+from .joints import Joints, make_joints
 
 LATE_SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
 MIN_WINDOW_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
@@ -358,6 +362,8 @@ class LumpedEvaluator(RunEvaluator):
         }
         if not is_sinusoidal(drive):
             values |= dict.fromkeys(select_names("sine"))
+        if self.model.rig.drive.kind == "free":
+            del values[AMPLITUDE]  # The engine knows that of the window; see its row in the table.
         window = run.window
         if not self.has_friction:
             values |= dict.fromkeys(select_names("run"))

@@ -17,8 +17,8 @@ from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...response.measures import Measures
 from ...response.rows import MOTION_TABLE
 from .engines import find_obstacle_of_map
+from .evaluation import first_interface_load
 from .joints import make_undriven_rig
-from .solution import first_interface_load
 
 FLUTTER_MEASURE = "flutter_amplitude"
 NO_MOVING_INTERFACE_NOTE = (

@@ -25,7 +25,7 @@ from ...model.structure import N_YAW_BANDS
 from ..bench import averaged_law
 from ..patch import faces, jenkins_elements
 from . import bands, bond_lists
-from .numerics import Numerics
+from .engines import Numerics
 
 NO_STEADY_LOOP = (
     'bonds have a steady loop only with friction.reading = "stretch", friction.order = 1, a constant bond length and '

@@ -19,8 +19,15 @@ from ..bench.engine import BondListGuard
 from . import bands
 from .bond_lists import choose_bond_summation, has_bond_list
 from .contact_points import make_contact
-from .evaluation import RunEvaluator, compute_work_check
-from .solution import Fields, Solution, compute_sampled_loop, describe_escape, find_travel
+from .evaluation import (
+    Fields,
+    RunEvaluator,
+    Solution,
+    compute_sampled_loop,
+    compute_work_check,
+    describe_escape,
+    find_travel,
+)
 
 # Largest move in a step of an interface that sticks rigidly, relative to the sum of the slides of its modes: round-off
 MAX_HELD_MOVE = 1e-9

@@ -18,13 +18,12 @@ from ...motion_measures import MAX_RESTING_SLIDE_RANGE
 from ...response.outcome import describe_ringing, find_ringing, note_on_changing_drive
 from ...response.rows import AMPLITUDE
 from ...structure.drive_sizes import find_min_decay_rate
-from ..results.interfaces import Face, merge_sentences
+from ..results.interfaces import Face, merge_sentences, warn_of_large_slide
 from ..results.notes import LawFacts, list_law_notes, list_law_warnings
 from ..results.result import Settings
-from ..results.travel import warn_of_large_slide
 from . import joints
 from .engines import ENGINES, find_obstacle_of_map
-from .solution import first_interface_load
+from .evaluation import first_interface_load
 
 SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 # Speed at half the friction limit of a law that creeps, relative to its reference speed: the inverse of tanh at 1/2.

@@ -15,7 +15,7 @@ from ...model.model import Model
 from ...response.measures import Values
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from . import bond_lists
-from .numerics import choose_numerics
+from .engines import choose_numerics
 
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as
 # resonant.

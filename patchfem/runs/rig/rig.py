@@ -1,7 +1,8 @@
 """Run of a rig: solution with refined numerical settings, and completion of its result.
 
 In: the inputs of a run, i.e. its plan and its pressed interfaces. Out: a Result. `run_refined` solves the run with finer and
-finer settings until its measures meet the tolerance; `run_rig` completes it.
+finer settings until its measures meet the tolerance; each coarse run is solved only once (`Runner`). `run_rig` completes
+the result.
 """
 
 from dataclasses import dataclass, replace
@@ -12,9 +13,18 @@ import numpy as np
 from ...core import NotConverged, Outcome, PatchfemError
 from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...response import reasons, stationary
-from ...response.coarser import CoarserRuns, ComparisonRuns, StepRun, list_step_runs
 from ...response.decay_curve import DecayCurve
-from ...response.errors import absolute_change, add_errors, add_run_error_estimates
+from ...response.errors import (
+    CoarserRuns,
+    ComparisonRuns,
+    SourceErrors,
+    StepRun,
+    absolute_change,
+    add_errors,
+    add_run_error_estimates,
+    estimate_errors,
+    list_step_runs,
+)
 from ...response.measures import Measures
 from ...response.outcome import judge_outcome, remove_errors
 from ...response.rows import set_final_floors
@@ -22,20 +32,138 @@ from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
 from .. import refine
 from ..patch import faces
-from ..results.result import MotionData, Result, RunInputs, Settings
-from ..results.travel import check_pieces_overlap
-from . import bond_lists, decays, event_to_event, flutter, levels
+from ..results.interfaces import check_pieces_overlap
+from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, Settings
+from . import bond_lists, decays, event_to_event, flutter, march
 from . import fields as interface_fields
-from .engines import ENGINES, HYBRID, MARCH, list_runs_with_other_modes
-from .motion_warnings import collect_remarks
-from .numerics import (
+from .engines import (
+    ENGINES,
+    HYBRID,
+    MARCH,
     MAX_MARCH_STEPS_PER_CYCLE,
     MIN_RELATIVE_STEP_ERROR,
     Numerics,
     choose_numerics,
+    list_runs_with_other_modes,
 )
-from .solution import Solution, compute_peak_frequency
-from .solve import Runner
+from .evaluation import (
+    Solution,
+    add_level_errors,
+    compute_peak_frequency,
+    convert_to_scene_units,
+    measure_onset_level,
+    replace_output_by_gauge,
+)
+from .motion_warnings import collect_remarks
+from .steady import shooting
+
+
+def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+    """Compute the motion of a rig with the engine of its settings; the output is that of the gauge.
+
+    Parameters
+    ----------
+    model : Model
+        Rig, drive and friction laws.
+    numerics : Numerics
+        Numerical settings, including the name of the engine.
+    patch : Patch or None
+        None under [normal] and between masses.
+    frames : int
+        Number of snapshots of the interface in the last cycle.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction.
+    """
+    # Only the module of this engine is loaded.
+    if numerics.engine == "hybrid":
+        run = event_to_event.run_from_event_to_event
+    elif numerics.engine == "march":
+        run = march.march_in_time
+    else:
+        run = shooting.solve_steady_motion
+    return replace_output_by_gauge(model, run(model, numerics, patch, frames, say, progress))
+
+
+class Runner:
+    """Solver of a rig with several numerical settings, which stores the solutions of coarse runs.
+
+    Parameters
+    ----------
+    inputs : RunInputs
+        Plan, Patch with its coarser mesh, and callbacks of the run.
+
+    Attributes
+    ----------
+    solutions : dict
+        Solution of each coarse run by its Numerics.
+    """
+
+    def __init__(self, inputs: RunInputs):
+        self.inputs = inputs
+        self.model = inputs.plan.model
+        self.solutions: dict[Numerics, Solution] = {}
+        self._done = 0.0  # reported fraction of all runs
+
+    def solve(self, numerics: Numerics) -> Solution:
+        """Solve the rig on its finest meshes, and store the frames of the interface that its result shows."""
+        has_fields = self.inputs.patch is not None or self.model.rig.friction.has_partial_slip
+        return self._solve(
+            self.model,
+            numerics,
+            self.inputs.patch,
+            N_INTERFACE_FRAMES * has_fields,
+            self.inputs.say,
+        )
+
+    def _solve_coarse_run(self, numerics: Numerics) -> Solution:
+        """Solve the rig with the settings of a comparison run, without frames of the interface.
+
+        The settings say what is coarser: the mesh, the modes of a reduced structure, or a joint whose stiffness differs.
+        """
+        model = self.model
+        patch = self.inputs.patches[numerics.coarse_patch]
+        if numerics.other_rig is not None:
+            model = replace(model, rig=model.rig.structure.other_rigs[numerics.other_rig])
+        if numerics.stiffer_joint:
+            stiffer, (patch, *_) = self.inputs.stiffer[:2]
+            model = replace(stiffer, rig=replace(stiffer.rig, drive=model.rig.drive))
+        # The decay curve needs histories from the start of the run.
+        needs_whole = model.rig.drive.kind == "free"
+        return self._solve(model, replace(numerics, whole=needs_whole), patch)
+
+    def _solve(self, model, numerics: Numerics, patch, frames: int = 0, say=None) -> Solution:
+        """Solve a rig, and report the completed fraction of all runs.
+
+        Parameters
+        ----------
+        model : Model
+            Model of the rig.
+        numerics : Numerics
+            Cycles, steps and other settings of the run.
+        patch : Patch or None
+            Solved patch.
+        frames : int
+            Number of frames of the fields in the last cycle.
+        say : callable, optional
+            Function that takes a line of text on the progress.
+        """
+        # Each run is a half of what is left, because the number of coarse runs is not known.
+        left = 1 - self._done
+        share = left / 2 if self.inputs.estimate else left
+
+        def report(fraction: float) -> None:
+            """Report the completed fraction of all runs, given that of the present run."""
+            if self.inputs.progress is not None:
+                self.inputs.progress(1 - left + share * fraction)
+
+        solution = solve_rig(model, numerics, patch, frames, say, report)
+        self._done += share
+        return solution
+
+    def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
+        """Estimate the errors of a run from coarse runs (`response.errors.estimate_errors`)."""
+        return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)
+
 
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
@@ -138,7 +266,7 @@ def run_rig(inputs: RunInputs) -> Result:
 
     # The reasons of missing values depend on the outcome, so that they come after it.
     if run.solution.levels and run.has_friction:
-        onset = levels.measure_onset_level(rig, run.solution, model.accuracy.tolerance)
+        onset = measure_onset_level(rig, run.solution, model.accuracy.tolerance)
         run = replace(run, measures=run.measures | {"onset_level": onset})
     run = complete_measures(run)
     if rig.drive.kind == "free" and run.has_errors:
@@ -381,7 +509,7 @@ def _add_level_errors(
             pairs.append((solutions[kind.runs[0]], kind.reference and solutions[kind.reference]))
     level_results = ()
     if solution.levels:
-        level_results = levels.add_level_errors(solution.levels, used_runs, solutions)
+        level_results = add_level_errors(solution.levels, used_runs, solutions)
     return replace(solution, levels=level_results, coarser=tuple(pairs))
 
 
@@ -502,7 +630,7 @@ def _collect_motion(run: CoupledRun) -> MotionData:
         period=run.drive.period,
         energies=solution.book,
         step_runs=run.step_runs,
-        levels=levels.convert_to_scene_units(run.model.rig, solution.levels),
+        levels=convert_to_scene_units(run.model.rig, solution.levels),
         events=solution.log,
         decay=run.decay,
         spectra=spectra,

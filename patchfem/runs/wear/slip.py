@@ -16,10 +16,10 @@ from ...response.rows import AMPLITUDE
 from ..bench import bench
 from ..bench.engine import steps_per_cycle
 from ..bench.slides import integrate_steps
+from ..results.interfaces import check_pieces_overlap
 from ..results.patch_rows import Values
 from ..results.result import UNBOUNDED_OUTCOMES
-from ..results.travel import check_pieces_overlap
-from ..rig import bands, fields, numerics, solve
+from ..rig import bands, engines, fields, rig
 
 MIN_CYCLE_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
@@ -240,8 +240,8 @@ def _follow_rig(model, patch, frames: int) -> _Motion:
     `model` and `patch` are those at the present worn depth, and `frames` is the number of frames in the last cycle; with
     0 the nodes are None. The outcome is None unless the motion has no bound.
     """
-    settings = numerics.choose_numerics(model)
-    solution = solve.solve_rig(model, settings, patch, frames)
+    settings = engines.choose_numerics(model)
+    solution = rig.solve_rig(model, settings, patch, frames)
     response = solution.response
 
     # A motion without bound has no slip path (the caller stops the wear).

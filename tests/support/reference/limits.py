@@ -44,7 +44,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "surface.files.content.MAX_SURFACE_FILE_BYTES": "bytes of the file of a scan, also after decompression",
     "surface.files.table.MAX_COORDINATE": "length of a trace [m]",
     "model.slide.MAX_BENCH_STEPS_PER_CYCLE": "steps per cycle of a prescribed slide",
-    "runs.rig.numerics.MAX_MARCH_STEPS_PER_CYCLE": (
+    "runs.rig.engines.MAX_MARCH_STEPS_PER_CYCLE": (
         "steps per cycle of a time integration, if the tolerance determines the steps"
     ),
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",

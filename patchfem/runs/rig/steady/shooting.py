@@ -1,7 +1,8 @@
 """Steady motion of a rig by shooting with the map of a period of the engine `hybrid`.
 
-In: a Model, its Numerics and its Patch. Out: the Solution under a sine (`hybrid.periodic`), and the response curve over
-frequency, by continuation through its folds where it may have some (`hybrid.periodic_curves`).
+In: a Model, its Numerics and its Patch. Out: the Solution under a sine (`hybrid.periodic`) with its regime, Floquet
+multipliers and stability, and the largest motion of a response curve over frequency, by continuation through its folds
+where it may have some (`hybrid.periodic_curves`).
 """
 
 from dataclasses import replace
@@ -25,10 +26,9 @@ from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
 from ...results.result import Settings, SteadyData
 from ..engines import estimate_hybrid_errors, may_fold
+from ..evaluation import Solution
 from ..event_to_event import LumpedEvaluator
 from ..joints import make_joints
-from ..solution import Solution
-from .curve_points import sample_adaptively
 from .curves import (
     COLUMN_MEASURES,
     INTERPOLATION_TOL,
@@ -39,6 +39,8 @@ from .curves import (
     describe_instability,
     estimate_point_errors,
     note_end_of_curve,
+    sample_adaptively,
+    solve_peak,
 )
 
 N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
@@ -553,3 +555,34 @@ def find_relative_error(motion: periodic.PeriodicMotion) -> float:
     It is the error of the fixed point of the map of a period, plus that of the time steps within the period.
     """
     return motion.error + STEPS_ERROR * RTOL
+
+
+def solve_steady_motion(
+    model, numerics, patch, frames: int = 0, say=None, progress=None
+) -> Solution:
+    """Compute the steady motion under a sine, or the largest one over a sweep.
+
+    The drive of the largest motion is `Solution.drive`.
+
+    Parameters
+    ----------
+    model : Model
+        Rig, drive and friction laws.
+    numerics : Numerics
+        Settings of the run, from which the finder makes its own.
+    patch : Patch or None
+        None under [normal] and between masses.
+    frames : int
+        Number of snapshots of the interface in a cycle.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction; progress is not used.
+
+    Returns
+    -------
+    Solution
+    """
+    finder = ShootingFinder(model, numerics, patch, frames, say)
+    drive = model.rig.drive.signal
+    if isinstance(drive, SineDrive):
+        return finder.compute_steady_motion(drive)
+    return solve_peak(finder.trace_curve(drive), finder)
