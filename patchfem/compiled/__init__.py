@@ -426,11 +426,10 @@ def instantiate(
     ValueError
         If the module does not import another one exactly once under one of these names.
     """
-    names = {
-        alias: getattr(replacement, "__name__", f"patchfem.{replacement}")
-        for alias, replacement in replacements.items()
-    }
-    text = _replace_imports(module, tuple(names.items()))
+    names = []
+    for alias, replacement in replacements.items():
+        names.append((alias, getattr(replacement, "__name__", f"patchfem.{replacement}")))
+    text = _replace_imports(module, tuple(names))
     imported = [other for other in replacements.values() if isinstance(other, KernelModule)]
 
     # Each new module would load its machine code (about 1 MB) again, in every run of a long sweep.

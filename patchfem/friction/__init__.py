@@ -17,7 +17,6 @@ PUBLIC = {
     "bonds.list_numbers": ("join_lists", "make_lists", "make_no_lists"),
     "bonds.parameters": (
         "Bonds",
-        "MAX_LIST_SECONDS",
         "growth_numbers",
         "growth_path_ratio",
     ),

@@ -3,8 +3,6 @@
 import pytest
 
 from patchfem import load
-from patchfem.core import Missing
-from patchfem.runs.bench import engine
 from patchfem.runs.run import run
 
 RIG = """[normal]
@@ -76,14 +74,3 @@ def test_always_list_of_stuck_block_is_bounded(text):
     """A stuck block reverses in almost every step; its list joins strips and stays below 500."""
     result = run(load(text))
     assert result.motion.energies["strips"] < 500
-
-
-def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
-    """A run whose list of bonds would take too long is stopped early, with an estimate of its time and the key to lower."""
-    scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 30"))
-    monkeypatch.setattr(engine, "MAX_LIST_SECONDS", 0.01)
-    pattern = (
-        r"computing time of about (\d+) s, more than the limit of 0 s; lower the number of cycles"
-    )
-    with pytest.raises(Missing, match=pattern):
-        run(scene, estimate=False)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 CONSTANT_LENGTH_FLAG = -1.0  # value in place of a_s that marks a constant bond length
-MAX_LIST_SECONDS = 600.0  # largest estimated CPU time [s] of a run with a list of bonds
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,8 +90,6 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
 
     Raises
     ------
-    Missing
-        If the sum over lists of bonds would take too long.
     NotConverged
         If the force of a step has too large an error.
     """

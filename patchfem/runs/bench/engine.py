@@ -6,15 +6,12 @@ parallel elements obey Masing's rules; contact points and lists of bonds use the
 
 from dataclasses import dataclass, replace
 from math import ceil
-from time import thread_time
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Missing
 from ...effects import law_has_trait, law_supports
 from ...friction.bonds import engines as bond_engines
-from ...friction.bonds.parameters import MAX_LIST_SECONDS
 from . import contact_points
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
@@ -152,51 +149,6 @@ def mean_stroke(slide) -> tuple[float, float]:
     directions = np.sign(moves[moves != 0])
     count = 1 + np.count_nonzero(directions[1:] != directions[:-1])
     return float(np.abs(moves).sum()) / count, max(directions.size / count, 1.0)
-
-
-class BondListGuard:
-    """Progress callback that stops a run whose lists of bonds take too much CPU time.
-
-    The cost per step does not decrease, because a list never becomes shorter. Therefore the rest of the run takes at
-    least as long per step as the last part of it.
-    """
-
-    def __init__(self, progress=None):
-        self.progress = progress
-        # CPU time [s] and completed fraction at the first call, so that compilation does not count, and at the last one.
-        self.start = None
-        self.last = None
-
-    def __call__(self, fraction: float) -> None:
-        """Report the completed fraction of the steps, and stop a run that takes too long.
-
-        Raises
-        ------
-        Missing
-            If the whole run would take more than MAX_LIST_SECONDS of CPU time.
-        """
-        now = thread_time()
-        if self.start is None:
-            self.start = self.last = now, fraction
-        spent = now - self.start[0]
-        done = fraction - self.last[1]
-        if done > 0 and spent > MAX_LIST_SECONDS / 60:
-            seconds = spent + (now - self.last[0]) / done * (1 - fraction)
-            refuse_slow_list(seconds, MAX_LIST_SECONDS)
-        self.last = now, fraction
-        if self.progress is not None:
-            self.progress(fraction)
-
-
-def refuse_slow_list(seconds: float, limit: float) -> None:
-    """Raise Missing if the CPU time [s] that the sums over lists of bonds of a run take is above a limit [s]."""
-    if seconds > limit:
-        raise Missing(
-            f"the sum over the list of bonds would need a computing time of about {seconds:.0f} s, more than "
-            f"the limit of {limit:.0f} s; lower the number of cycles or accuracy.steps_per_cycle, raise "
-            'accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1',
-            "",
-        )
 
 
 def uses_parallel_elements(model) -> bool:

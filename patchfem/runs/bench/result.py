@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import Missing, NotConverged, Outcome
+from ...core import NotConverged, Outcome
 from ...formatting import format_quantity
 from ...response.errors import add_errors
 from ...response.outcome import OPEN_LOOP_MESSAGE, remove_errors
@@ -154,7 +154,7 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list[str]:
     cycles = slide.cycles + N_STEADY_CHECK_CYCLES
     try:
         longer = bench.run_bench(replace(model, slide=replace(slide, cycles=cycles)), patch, steps)
-    except (Missing, NotConverged):
+    except NotConverged:
         return [f"{text}; raise slide.cycles"]
 
     # The loop is steady if the last two cycles of the longer run do the same work.

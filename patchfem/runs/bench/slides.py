@@ -25,7 +25,6 @@ from .engine import (
     CLOSED_FORM,
     PARALLEL_ELEMENTS,
     BenchEngine,
-    BondListGuard,
     has_changing_pressure,
 )
 
@@ -109,8 +108,6 @@ def follow_path(task: SlideTask) -> SlideHistories:
 
     Raises
     ------
-    Missing
-        If lists of bonds become too long.
     NotConverged
         If the force of a step has too large an error.
     """
@@ -387,9 +384,9 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
         if contact.load is not None:
             contact = replace(contact, load=partial(np.interp, xp=time, fp=load))
 
-    # A long bond list is stopped by its guard before it takes too long.
-    report = BondListGuard(task.progress) if contact.has_lists else task.progress
-    motion = time_steps.slides.follow(contact, time, task.slide, task.frames, task.say, report)
+    motion = time_steps.slides.follow(
+        contact, time, task.slide, task.frames, task.say, task.progress
+    )
     if motion.n_unsolved:
         raise NotConverged(
             f"in {motion.n_unsolved} time steps of the prescribed slide the friction force has an error "

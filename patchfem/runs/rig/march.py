@@ -15,9 +15,8 @@ from ...response.loops import CycleLoop
 from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ...time_steps import time_march as engine
-from ..bench.engine import BondListGuard
 from . import bands
-from .bond_lists import choose_bond_summation, has_bond_list
+from .bond_lists import choose_bond_summation
 from .contact_points import make_contact
 from .evaluation import (
     Fields,
@@ -54,7 +53,6 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     reduced = process_time() - begin
     engine.load_kernels(contact, say)
     prepare = {"reduce": reduced, "compiled_code": process_time() - begin - reduced}
-    progress = BondListGuard(progress) if has_bond_list(model, numerics) else progress
     return MarchEvaluator(model, numerics, patch, contact).solve(frames, progress, prepare)
 
 

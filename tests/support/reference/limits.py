@@ -47,7 +47,6 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "runs.rig.engines.MAX_MARCH_STEPS_PER_CYCLE": (
         "steps per cycle of a time integration, if the tolerance determines the steps"
     ),
-    "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
     "hybrid.cases.MAX_STEPS": "steps of a motion from event to event, with method `exact` or by engine `hybrid`, beside "
     "100 in each cycle",
     "structure.drive_sizes.MAX_STORED_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
