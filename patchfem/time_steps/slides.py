@@ -18,7 +18,7 @@ SAME_STEP = 1e-6  # relative change of the duration of a step below which steps 
 class SlideMotion(NamedTuple):
     """Friction along a prescribed slide at k samples.
 
-    - force, slip, load (k,): friction force [N], slip [m] and normal load [N]
+    - force, slip (k,): friction force [N] and slip [m]
     - mean (k - 1,): mean force of each step [N]
     - stored (k,): stored energy [J]
     - losses (k - 1,): dissipated energy of each step [J], below 0 if energy is created
@@ -29,7 +29,6 @@ class SlideMotion(NamedTuple):
 
     force: np.ndarray
     slip: np.ndarray
-    load: np.ndarray
     mean: np.ndarray
     stored: np.ndarray
     losses: np.ndarray
@@ -102,7 +101,6 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
     return SlideMotion(
         rows[:, Sample.PORTS],
         rows[:, Sample.PORTS + 1],
-        rows[:, Sample.LOAD],
         rows[:-1, Sample.PORTS + 2],
         rows[:, Sample.ENERGY],
         split_losses(rows, 0, system.options.scale),
