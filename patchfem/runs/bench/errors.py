@@ -12,7 +12,6 @@ import numpy as np
 
 from ... import slip
 from ...effects import law_has_trait
-from ...friction.bonds import engines as bond_engines
 from ...response.errors import (
     CoarserRuns,
     StepRun,
@@ -96,7 +95,7 @@ def estimate_bench_errors(model, patches, fine_run, steps: int, say=None) -> Ben
     coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
     bench_runs = {}
     errors = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
-    if _find_bond_sum_error(model, fine_run):
+    if _find_bond_sum_error(fine_run):
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
 
     # The history of step numbers serves the accuracy curve of the report.
@@ -167,14 +166,10 @@ def list_coarser_runs(model, patches, fine_run, steps: int) -> list[CoarserRuns]
     return out
 
 
-def _find_bond_sum_error(model, fine_run) -> float:
+def _find_bond_sum_error(fine_run) -> float:
     """Return the error of the bond summation of a BenchRun relative to the friction limit; 0 without bonds."""
     choice = fine_run.engine.choice
-    if choice is None:
-        return 0.0
-    # Strips of a full list are wider than those of the choice.
-    forced = bond_engines.estimate_strip_error(model.bonds, fine_run.forced_width)
-    return max(choice.error, forced)
+    return 0.0 if choice is None else choice.find_error(fine_run.join_error)
 
 
 def _estimate_bond_sum_errors(model, fine_run) -> Values:
@@ -182,7 +177,7 @@ def _estimate_bond_sum_errors(model, fine_run) -> Values:
     work = np.abs(np.diff(fine_run.ledger[0]))
     return friction_errors(
         fine_run.values,
-        _find_bond_sum_error(model, fine_run),
+        _find_bond_sum_error(fine_run),
         model.friction,
         float(fine_run.load.max()),
         (float(work.sum()), float(work[fine_run.first :].sum())),
