@@ -389,11 +389,9 @@ def _build_law(scene: Scene, rig_model: Rig | None) -> _SceneLaw:
     law = interfaces[0] if interfaces else scene.friction
     if law is None:
         return _SceneLaw()
-    pad = (
-        interfaces[0].contact and interfaces[0].contact.width
-        if interfaces
-        else find_pad_width(scene)
-    )
+    pad = find_pad_width(scene)
+    if interfaces and interfaces[0].contact is not None:
+        pad = interfaces[0].contact.width
     if rig_model is not None:
         friction = rig_model.friction.interfaces[0].numbers
     else:

@@ -349,7 +349,17 @@ def find_point_load(points, index, x, resultant):
 
 @njit(**NJIT_CALL)
 def pick_load(values, row, direction):
-    """Return the load [N] of a rigid point that limits friction in a direction; `row` is that of the loads to +x."""
+    """Return the load [N] of a rigid point that limits friction in a direction.
+
+    Parameters
+    ----------
+    values : (k,) array
+        Values of the block of the point.
+    row : Value
+        START_LOAD or END_LOAD.
+    direction : float
+        Sign of the motion.
+    """
     return values[row + Value.START_BACK] if direction < 0 else values[row]
 
 

@@ -13,8 +13,6 @@ where the pressure vanishes: such a point carries nothing, and the average ends 
 which the pressure is 0.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.special import gammainc, gammainccinv
 
@@ -25,17 +23,6 @@ from .coulomb import Coulomb
 N_POSITIONS_PER_BLOCK = 64
 # Largest weight of a node beyond the cut-off in an average; it is below round-off
 CUTOFF_WEIGHT = 1e-20
-
-
-class SlidingLimits(NamedTuple):
-    """Friction force / mu_s [N] in rigid sliding, >= 0.
-
-    - forward: towards +x
-    - backward: towards -x
-    """
-
-    forward: float
-    backward: float
 
 
 def from_keys(friction, load: float) -> Coulomb:
@@ -155,29 +142,3 @@ def average_pressure(
         weights = _node_weights(block, nodes[node_range], segments, length, order)
         averages[first : first + N_POSITIONS_PER_BLOCK] = weights @ sigma[node_range]
     return averages
-
-
-def sliding_limits(nodes, sigma, weight, length: float, order: float) -> SlidingLimits:
-    """Return the friction forces / mu_s in rigid sliding in both directions.
-
-    They differ where the pressure is not symmetric: each lacks what its own trailing edge would carry.
-
-    Parameters
-    ----------
-    nodes : (m,) array
-        Increasing positions [m] of the nodes.
-    sigma : (m,) array
-        Pressure [Pa] >= 0 at the nodes, linear between them and 0 outside.
-    weight : (m,) array
-        Areas [m2] of the nodes.
-    length, order : float
-        Bond length eps [m] and exponent p > -1.
-
-    Returns
-    -------
-    SlidingLimits
-    """
-    weight = np.where(np.asarray(sigma) > 0, weight, 0.0)
-    forward = weight @ average_pressure(nodes, nodes, sigma, 1.0, length, order)
-    backward = weight @ average_pressure(nodes, nodes, sigma, -1.0, length, order)
-    return SlidingLimits(float(forward), float(backward))

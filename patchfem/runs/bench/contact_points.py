@@ -170,7 +170,7 @@ def place_surface(model, patch, surface: Surface) -> Surface:
     elif model.load_varies:
         rise = float(model.point.evaluate(np.zeros(1))[0] / model.point.load)
     lower = None
-    if patch is not None and patch.model.gap.side == "lower" and model.grooves is None:
+    if patch is not None and model.grooves is None and patch.model.gap.side == "lower":
         lower = _place_on_lower_piece(patch, surface)
     return surface._replace(rise=rise, lower=lower)
 

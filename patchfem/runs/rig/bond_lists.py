@@ -55,17 +55,18 @@ def _list_parts(model: Model) -> list[Model]:
     interfaces = model.rig.friction.interfaces
     if len(interfaces) < 2:
         return [model]
-    return [
-        replace(model, friction=interface.numbers, point=replace(model.point, load=interface.load))
-        for interface in interfaces
-    ]
+    parts = []
+    for interface in interfaces:
+        point = replace(model.point, load=interface.load)
+        parts.append(replace(model, friction=interface.numbers, point=point))
+    return parts
 
 
 def has_bond_list(model: Model, numerics: Numerics) -> bool:
     """Return whether an interface needs a list of all bonds that have formed, over which its force is summed."""
     if model.friction is None:
         return False
-    return choose_bond_summation(model, numerics).engine != "recursion"
+    return any(map(sums_over_lists, _list_parts(model)))
 
 
 def _choose_summation(model: Model, numerics: Numerics, number: int):

@@ -60,14 +60,12 @@ def make_contact(model: Model, numerics, patch):
             fields["elements"] = found[0].reduction
         if not sets:
             surfaces = _list_surfaces(model, numerics, patch)
-            choice = bond_lists.choose_bond_summation(model, numerics)
-            surfaces = [
-                part._replace(
-                    has_half_cells=numerics.has_half_cells,
-                    bond_sum=make_bond_sum(model, part.keys, choice),
-                )
-                for part in surfaces
-            ]
+            halves = {"has_half_cells": numerics.has_half_cells}
+            surfaces = [part._replace(**halves) for part in surfaces]
+            if bond_lists.has_bond_list(model, numerics):
+                choice = bond_lists.choose_bond_summation(model, numerics)
+                sums = [make_bond_sum(model, part.keys, choice) for part in surfaces]
+                surfaces = [part._replace(bond_sum=one) for part, one in zip(surfaces, sums)]
             moves = "sets" in fields
             count = numerics.shear_modes
             sets = [make_points(model, part, count, moves=moves) for part in surfaces]

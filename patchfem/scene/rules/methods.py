@@ -223,10 +223,11 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     for number, interface in enumerate(scene.structure.interface):
         patch_key = f"structure.interface.{number}.contact"
         lower += list_lower_shapes(interface.table.contact, patch_key)
+    joints = []
+    for law in laws:
+        joints.append(Joint(law, find_compliance_key(law, tables), _is_uneven(law, tables)))
     return MotionFeatures(
-        joints=[
-            Joint(law, find_compliance_key(law, tables), _is_uneven(law, tables)) for law in laws
-        ],
+        joints=joints,
         load_change=load_change and f"with {describe_load_change(load_change)}",
         bands_yaw=bool(scene.contact.area and find_yaw_key(tables)),
         spring=find_nonlinear_spring(tables),

@@ -2,17 +2,14 @@
 
 from importlib import import_module
 
-from patchfem.effects import LAWS, REMEDIES, join_words, name_laws_with_key
+from patchfem.effects import LAWS, REMEDIES, join_words
 from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_REPORTED_NORMAL_COUPLING_RATIO
-from patchfem.scene import loads
 from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
 from patchfem.scene.rules import support
 
 from .keys import FOLDER, format_table, iterate_bounds, iterate_tables
 from .tried import (
-    BENCH,
     BENCHES,
-    FORMS,
     METHODS,
     MORE,
     POINT,
@@ -27,9 +24,8 @@ FILE = FOLDER / "LIMITS.md"
 HEAD = """\
 # Limits
 
-`python tests/support/reference` generates this page. Each cell of the first four tables is the result of checking one
-scene. "yes" means that the scene can run. "no" means that the scene is refused before the run, with a message that
-names the line, the key and an alternative; `patchfem check SCENE` prints it. The last section says what the models
+`python tests/support/reference` generates this page. A scene that cannot run is refused before the run, with a message
+that names the line, the key and an alternative; `patchfem check SCENE` prints it. The last section says what the models
 neglect.
 """
 SIZES = {  # Constant -> description of the quantity that it bounds.
@@ -150,9 +146,7 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "mode with yaw": "`yaw` of a `[[structure.mode]]` is not 0",
     "memory of the slip": "a law with stretch or bonds, or partial slip",
     "kinetic below static": "law that sticks rigidly, with `kinetic` less than `static`",
-    "no friction": "`static = 0`",
     "bonds of a given stiffness": "`stiffness` of a law that takes `bond_length` in its place",
-    "spread of the bonds": f"`spread` of law {name_laws_with_key('spread')}".replace(" and ", " or "),
     "bonds that no force can move": "law nonlocal with reading 'report', -1 < `order` < 0 and `initial_bonds` > 0",
     "partial slip": "`[patch.shear]`, `patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`",
     "shape on the lower piece": "`on` is `lower` in " + join_words(SHAPES, "or"),
@@ -167,19 +161,25 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
 METHOD_COLUMNS = tuple(
     SceneColumn(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS
 )
-TABLES = (("Laws in a rig", RIGS), ("Laws in a rig, continued", MORE), ("Laws on a bench", BENCHES))
+# Each law runs with each of these scenes.
+TABLES = {"Laws in a rig": (*RIGS, *MORE), "Laws on a bench": BENCHES}
+LAWS_TEXT = """\
+Every friction law runs with every effect, in a rig and on a bench: partial slip of elastic pieces, pressure over a face,
+bands that yaw, shapes on either piece, a load that oscillates, heave and pitch, grooves, nonlinear springs, several
+interfaces with or without patches, and wear. The rows below are the exceptions, whatever the law unless they name one.
+Methods `auto` and `march` run all of them. Methods `exact` and `harmonic` need a state of a fixed size; they refuse law
+nonlocal with another `order` than 1 or with reading 'report', and a motion that the message names.
+"""
 
 
 def text() -> str:
     """Return the page patchfem/scene/LIMITS.md; scenes are assembled and checked, but not run."""
-    body = []
-    for title, columns in TABLES:
-        body += [f"## {title}", _format_compatibility(columns)]
-    body += [
-        "## Methods",
-        "In this table each scene is a rig with a single contact point under a sine drive. The "
-        "heading of a column is the value of `accuracy.method`; `auto` chooses a method that supports the law.",
-        _format_compatibility(METHOD_COLUMNS),
+    refused = [row for columns in TABLES.values() for row in find_refusals(columns)]
+    if refused:
+        raise ValueError(f"a law is refused with an effect: {refused}")
+    body = [
+        "## Laws",
+        LAWS_TEXT.strip(),
         "## Combinations",
         "`patchfem check` refuses a scene in which all features of a row stand together. A feature in code style is a key, "
         "a table or a value of a key; `patch` stands for `contact` or `structure.interface.contact`.",
@@ -207,10 +207,10 @@ def format_messages() -> str:
     """Return the page of the messages with which the scenes of the tables of limits are refused."""
     parts = [
         "# Messages of unsupported combinations",
-        "[Limits](../../../patchfem/scene/LIMITS.md) shows which friction law goes with which table. The "
-        "tables below give the message for each combination that is refused.",
+        "[Limits](../../../patchfem/scene/LIMITS.md) lists what is refused. The table below gives the message for each "
+        "law that a method refuses.",
     ]
-    for title, columns in (*TABLES, ("Methods", METHOD_COLUMNS)):
+    for title, columns in (("Methods", METHOD_COLUMNS),):
         rows = [
             (law, words, "; ".join(sentences))
             for (law, words), sentences in find_refusals(columns).items()
@@ -227,18 +227,6 @@ def find_refusals(columns: tuple) -> dict:
             if sentences := find_refusal(keys, column):
                 rows[law, column.words] = sentences
     return rows
-
-
-def _format_compatibility(columns: tuple) -> str:
-    """Return the table that shows for each law which columns are permitted."""
-    rows = find_refusals(columns)
-    return format_table(
-        ("law", *(column.words for column in columns)),
-        [
-            (name, *("no" if (name, column.words) in rows else "yes" for column in columns))
-            for name in list_laws()
-        ],
-    )
 
 
 def _format_combinations() -> str:
@@ -259,36 +247,8 @@ def _format_combinations() -> str:
 def _format_features() -> str:
     """Return the table that defines the features of combinations that are not keys."""
     names = {name: None for row, _ in support.UNSUPPORTED_COMBINATIONS for name in row.split(", ")}
-    rows = [
-        (name, define_feature(name)) for name in sorted(names) if name in support.JOINT_FEATURES
-    ]
+    rows = [(name, MEANINGS[name]) for name in sorted(names) if name in support.JOINT_FEATURES]
     return format_table(("feature", "keys"), rows)
-
-
-def define_feature(name: str) -> str:
-    """Return the keys, or the laws, that give a scene a feature of a combination."""
-    if name not in support.LAW_FEATURES:
-        return MEANINGS[name]
-    laws = {form: law_has_feature(form, name) for form in list_laws()}
-    for law, forms in FORMS.items():
-        # Rows of the tables of laws that differ by a key of the same law
-        if all(laws[form] for form in forms):
-            laws |= {form: form == law for form in forms}
-    names = "law " + join_words([form for form, is_there in laws.items() if is_there], "or")
-    return names.replace(", order 2", " with another order than 1").replace(
-        ", reading", " with reading"
-    )
-
-
-def law_has_feature(form: str, name: str) -> bool:
-    """Return whether a law of the tables of limits has a feature, at an interface or alone."""
-    friction = loads(f"{POINT}{BENCH}[friction]\n{list_laws()[form]}").friction
-    joint = support.Joint.__new__(support.Joint)
-    joint.table = friction
-    found = []
-    for joint.is_interface in (False, True):
-        found.append(support.LAW_FEATURES[name](joint))
-    return any(found)
 
 
 def _format_bounds() -> str:
