@@ -24,7 +24,7 @@ class SlideMotion(NamedTuple):
     - losses (k - 1,): dissipated energy of each step [J], below 0 if energy is created
     - snapshots: states of the points at the frames
     - n_unsolved: number of steps that did not converge
-    - forced_width: width [bond lengths] to which strips were joined because a list was full; 0 if none was
+    - join_error: largest error of a join that made room in a full list of bonds, relative to the load
     """
 
     force: np.ndarray
@@ -35,7 +35,7 @@ class SlideMotion(NamedTuple):
     losses: np.ndarray
     snapshots: list[Snapshot]
     n_unsolved: int
-    forced_width: float = 0.0
+    join_error: float = 0.0
 
 
 def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> SlideMotion:
@@ -96,9 +96,9 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         if report is not None:
             report(end / last)
 
-    forced_width = 0.0
+    join_error = 0.0
     if system.options.has_lists:
-        forced_width = float(system.lists.states[:, ListState.WIDTH].max(initial=0.0))
+        join_error = float(system.lists.states[:, ListState.JOIN_ERROR].max(initial=0.0))
     return SlideMotion(
         rows[:, Sample.PORTS],
         rows[:, Sample.PORTS + 1],
@@ -108,5 +108,5 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         split_losses(rows, 0, system.options.scale),
         snapshots,
         int(system.totals[Total.UNSOLVED]),
-        forced_width,
+        join_error,
     )

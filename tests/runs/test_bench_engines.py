@@ -192,15 +192,15 @@ def test_exact_iwan_loop_agrees_with_closed_form(chi, beta, amplitude):
 
 
 def test_exact_full_list_of_bonds_widens_errors():
-    """Strips that a full list joins to .5 bond lengths dominate the error of the sum over bonds."""
+    """Joins of a full list with an error of 5 % dominate the error of the sum over bonds."""
     model = build(
         '[normal]\nload = "10 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\norder = 2\n'
         '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\ncycles = 1\n'
     )
     fine = bench.run_bench(model, None, 40)
-    full = replace(fine, forced_width=0.5)
+    full = replace(fine, join_error=0.05)
     free, forced = (
         dict(estimate_bench_errors(model, [None], one, 40).errors)["bonds"]["loop_area"]
         for one in (fine, full)
     )
-    assert fine.forced_width == 0 and forced > 10 * free
+    assert fine.join_error == 0 and forced > 10 * free

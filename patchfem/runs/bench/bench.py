@@ -44,7 +44,7 @@ class BenchRun:
     - first: index of the sample at which the last cycle starts.
     - engine: method that computed the friction force.
     - shear_modes: number of shear modes of the pieces; None without modes.
-    - forced_width: width [bond lengths] to which strips of bonds were joined because a list was full; 0 if none was.
+    - join_error: largest error of a join that made room in a full list of bonds, relative to the load.
     """
 
     time: np.ndarray
@@ -62,7 +62,7 @@ class BenchRun:
     first: int
     engine: BenchEngine
     shear_modes: int | None = None
-    forced_width: float = 0.0
+    join_error: float = 0.0
 
 
 def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) -> BenchRun:

@@ -12,7 +12,6 @@ import numpy as np
 
 from ... import slip
 from ...effects import law_has_trait
-from ...friction.bonds import engines as bond_engines
 from ...response.errors import (
     CoarserRuns,
     StepRun,
@@ -172,9 +171,8 @@ def _find_bond_sum_error(model, fine_run) -> float:
     choice = fine_run.engine.choice
     if choice is None:
         return 0.0
-    # Strips of a full list are wider than those of the choice.
-    forced = bond_engines.estimate_strip_error(model.bonds, fine_run.forced_width)
-    return max(choice.error, forced)
+    # A full list joins strips with larger errors than those of the choice.
+    return choice.find_error(fine_run.join_error)
 
 
 def _estimate_bond_sum_errors(model, fine_run) -> Values:

@@ -42,7 +42,7 @@ class SlideHistories(NamedTuple):
     - ledger (4, k): cumulative work, stored energy, cumulative dissipated and created energy [J].
     - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
     - shear_modes: number of shear modes of the pieces; None without modes.
-    - forced_width: width [bond lengths] to which strips of bonds were joined because a list was full; 0 if none was.
+    - join_error: largest error of a join that made room in a full list of bonds, relative to the load.
     """
 
     force: np.ndarray
@@ -52,7 +52,7 @@ class SlideHistories(NamedTuple):
     tau: np.ndarray
     local: np.ndarray
     shear_modes: int | None = None
-    forced_width: float = 0.0
+    join_error: float = 0.0
 
 
 class SlideTask(NamedTuple):
@@ -417,7 +417,7 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
     shape = contact.point_sets[0].shear
     count = None if shape is None else shape.stiffness.size
     return SlideHistories(
-        motion.force, load, local_slip, ledger, tau, local, count, motion.forced_width
+        motion.force, load, local_slip, ledger, tau, local, count, motion.join_error
     )
 
 
