@@ -18,6 +18,7 @@ from .march_rows_kernels import (
     N_PORT_COLUMNS,
     NO_CONTACT_SET,
     NOT_FINITE,
+    TOO_MANY_PARTS,
     Flank,
     Port,
     Sample,
@@ -32,6 +33,9 @@ from .motion_kernels import (
     sum_products,
     write_trial,
 )
+
+# Parts of a whole step, of which a stop or a release takes about 40, after which rigid friction stops and slips too often
+MAX_PARTS = 20_000
 
 
 @njit(**NJIT_CALL)
@@ -85,6 +89,8 @@ def try_step(system, level, row, begin, end, drive):
         last = drive[0] + dt * (drive[1] + 0.5 * dt * drive[2])
         if steps.find_event(system, level, last):
             return False
+    if not is_shortest and steps.gains_energy(system):
+        return False
     if not is_solved:
         # After a shortest step without a solution the march has no result, and shorter steps would only take time.
         if not is_shortest and system.totals[Total.UNSOLVED] == 0:
@@ -236,6 +242,7 @@ def march(system, n_steps, samples):
         # A step that fails is halved; steps double again once they end on a tick of the longer one.
         work = 0.0
         tick = 0
+        n_parts = 0
         while tick < ticks:
             part = ticks >> level
             tau = dt * tick / ticks
@@ -253,6 +260,9 @@ def march(system, n_steps, samples):
 
             work += steps.add_work(system, samples[i], first_column, part / ticks)
             tick += part
+            n_parts += 1
+            if n_parts > MAX_PARTS:
+                return i, TOO_MANY_PARTS
             if level > 0 and tick % (2 * part) == 0:
                 level -= 1
         samples[i, size + Sample.WORK] = work

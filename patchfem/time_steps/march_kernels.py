@@ -22,7 +22,8 @@ the points. A vibration on stiff points that the step does not resolve stays und
 show its error.
 
 A rigid point (`Law.COULOMB`), the only one on its port, slips under a given force, or its port is held at rest. A step in
-which a slipping port would reverse, or a port at rest is released, is halved up to the last level. The constant force of a
+which a slipping port would reverse, or a port at rest is released, is halved up to the last level, and so is one in which
+a port under the law "tanh" gains energy. The constant force of a
 step lets a held port move and come back. The work of this motion is taken from that of the drive, as friction at rest does
 none.
 
@@ -47,7 +48,6 @@ from .march_rows_kernels import (
     Total,
 )
 from .motion_kernels import (
-    INCREMENT_ROUND_OFF,
     TINY_LOAD,
     advance_shear,
     find_point_load,
@@ -72,10 +72,10 @@ MAX_OVERSHOOT = (
     0.5  # slope beyond the minimum of a potential, relative to that at the start of a line search
 )
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
-# Largest residual of such a step relative to RESIDUAL, and that of lists, because sums over bonds jump by up to 1e-8
+# Largest residual of such a step relative to RESIDUAL, and that of lists, whose means have quadrature errors
 STALLED = 1e3
 LISTS_STALLED = 1e5
-LIST_CUTS = 30  # trials of a line search for lists, down to round-off, between whose sides the force may jump
+LIST_CUTS = 30  # trials of a line search for lists
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
 # compliance of ports that share a force (`time_march.REDUNDANT`)
@@ -620,11 +620,6 @@ def solve_forces(system, level, step):
                 fraction *= CUT
         n_stalls = n_stalls + 1 if residual >= 0.5 * smallest else 0
         smallest = min(smallest, residual)
-
-        # Between the sides of a jump of a force the equation has no better solution.
-        if has_lists and system.points.stiffness.size == 0:
-            if fraction * find_largest_move(system, level) <= INCREMENT_ROUND_OFF:
-                return True
     return residual <= stalled
 
 
@@ -682,22 +677,6 @@ def drop_negative_slopes(system):
                     values[Value.MEAN_BY_SLIDE + j] = slope
                     values[Value.BY_SHEAR + j] = -slope
             moves[Port.BY_SLIDE, p] += sum_points(points, block, Value.BY_SLIDE)
-
-
-@njit(**NJIT_CALL)
-def find_largest_move(system, level):
-    """Return the largest increment of a port by Newton's step `ports.step`, relative to the largest one without forces."""
-    moves = system.ports.values
-    compliance = system.ports.compliance[level]
-    largest = 0.0
-    size = TINY
-    for p in range(moves.shape[1]):
-        size = max(size, abs(moves[Port.FREE, p]))
-        change = 0.0
-        for k in range(moves.shape[1]):
-            change += compliance[0, p, k] * system.ports.step[k]
-        largest = max(largest, abs(change))
-    return largest / size
 
 
 @njit(**NJIT_CALL)
@@ -798,6 +777,22 @@ def find_event(system, level, drive):
         if points.law[block] == Law.COULOMB and speed < find_creep(system, block):
             points.trial[block, 0] = 0.0
     return is_any_held and release_port(system, drive, is_shortest)
+
+
+@njit(**NJIT_CALL)
+def gains_energy(system):
+    """Return whether a port under the law "tanh", which stores no energy, gained energy in the trial step as it reversed."""
+    points = system.points
+    moves = system.ports.values
+    for p in range(moves.shape[1]):
+        block = points.first[p]
+        if block < points.first[p + 1] and points.law[block] == Law.TANH:
+            force = moves[Port.FORCE, p]
+            if points.first_shear[p] == points.first_shear[p + 1]:
+                size = max(abs(force), system.options.scale) * abs(moves[Port.INCREMENT, p])
+                if force * moves[Port.INCREMENT, p] < -RESIDUAL * size:
+                    return True
+    return False
 
 
 @njit(**NJIT_CALL)

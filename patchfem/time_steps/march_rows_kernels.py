@@ -15,6 +15,7 @@ EXCEEDS_TRAVEL = 1
 NOT_FINITE = 2
 NO_CONTACT_SET = 3
 LEAVES_GROOVES = 4
+TOO_MANY_PARTS = 5
 RESULTANT = -1  # node of a point whose load is a fraction of the resultant
 LOWER = -2  # node of a point whose load is the pressure of the lower piece at its place
 RESIDUAL = 1e-12

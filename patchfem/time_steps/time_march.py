@@ -25,6 +25,7 @@ from .march_rows_kernels import (
     N_PORT_COLUMNS,
     NO_CONTACT_SET,
     RESIDUAL,
+    TOO_MANY_PARTS,
     Flank,
     Sample,
     Shear,
@@ -285,6 +286,9 @@ class March:
         elif status == NO_CONTACT_SET:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = f"at step {self.done} the method could not determine which points are in contact; {advice}"
+        elif status == TOO_MANY_PARTS:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = f"in step {self.done} rigid friction stops and slips too often; {advice}, or give it a stiffness"
         elif status != DONE:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (

@@ -129,6 +129,19 @@ def test_always_difficult_random_chains_converge(seed):
 # ---- stops and releases inside steps
 
 
+def test_always_march_with_too_many_stops_ends():
+    """A rigid point that stops thousands of times within a step has no result, and the march ends with a message."""
+    result = march(
+        make_modal_basis(1e7, 0.0),
+        SineDrive(0.0, 1e3),
+        make_contact([make_coulomb(1e-3, 5e-4)], np.ones((1, 1))),
+        1,
+        4,
+        start=InitialState([1e-6], [0.0]),
+    )
+    assert result.outcome == "not_converged" and "too often" in result.message
+
+
 def find_errors(modes, drive, static, kinetic, cycles):
     """Return the largest relative error of the extremes of all cycles for 400, 1600 and 6400 steps.
 

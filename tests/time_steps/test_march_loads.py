@@ -124,12 +124,7 @@ def test_order_two_for_combined_slide_heave_and_pitch(name):
         ("coulomb", 42, 0),
         ("coulomb", 50, 0),
         ("weaker", 27, 0),
-        pytest.param(
-            *("tanh", 14, 0),
-            marks=pytest.mark.xfail(
-                reason="20 steps per cycle of tanh gain energy at a reversal", strict=True
-            ),
-        ),
+        ("tanh", 14, 0),
         ("growing", 225, 2),
     ],
 )
