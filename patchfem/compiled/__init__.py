@@ -344,12 +344,6 @@ class KernelFunction:
         function = getattr(self.module.load_module(), self.name)
         return function.get_standalone() if hasattr(function, "get_standalone") else function
 
-    def __getattr__(self, name: str):
-        """Return an attribute, by its name, of the dispatcher of numba, which is imported for it."""
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return getattr(self.get_dispatcher(), name)
-
 
 def _read_text(source: Path | str) -> str:
     """Return the text of a module from its file or its text."""

@@ -4,7 +4,8 @@ The answer is the table "The speeds" of README.md beside this file, which `--wri
 one thread.
 
 - First run: CPU time of `patchfem run` with an empty cache, minus that of a second run. The difference is compiling, and
-  in scenes of a patch also the condensation of the pieces.
+  in scenes of a patch also the condensation of the pieces. The median over all scenes is that of the templates and the
+  scenes of the studies that need no further key.
 - Step: time of the event-driven engine divided by its number of steps, for a block on a spring (m = k = 1) that is shaken
   at its natural frequency, with one law each. The bound is the arithmetic of such a step (16 stages of DOP853, error,
   coefficients of the dense output) with one friction force per stage, as straight-line compiled code. It has no
@@ -16,7 +17,7 @@ one thread.
 - DOP853: a block with Coulomb friction over 60 cycles by SciPy's DOP853 with events, at the first of its tolerances
   1e-4, 1e-5, ... whose true error is not larger than that of the event-driven engine.
 
-Run: OMP_NUM_THREADS=1 python studies/speed/speed.py [--share 0.1] [--beside CHECKOUT] [--write]      (15 CPU minutes)
+Run: OMP_NUM_THREADS=1 python studies/speed/speed.py [--share 0.1] [--beside CHECKOUT] [--write]      (17 CPU minutes)
 """
 
 import argparse
@@ -55,6 +56,7 @@ N_BOUND_STEPS = 200_000  # steps that are timed for the bound
 # first heading and further headings of the table of each kind of measurement
 HEADINGS = {
     "first": ("first run of", "compiling [CPU s]", "second run [CPU s]"),
+    "scenes": ("first run of every shipped scene", "compiling [CPU s]", "second run [CPU s]"),
     "step": ("step of the engine, law", "us per step", "bound [us]"),
     "cases": ("sweep", "cases per CPU s", "within the tolerance [%]"),
     "peer": ("one run", "time [ms]", "DOP853 with events [ms]"),
@@ -155,19 +157,55 @@ class Row(NamedTuple):
 # ---- first runs
 
 
-def measure_first_run(name: str, folder: Path) -> Row:
-    """Measure the CPU time of a first and of a second run of a scene, in processes of their own, below a folder."""
+def measure_two_runs(scene: Path, work: str) -> list[float]:
+    """Return the CPU seconds of a first and of a second run of a scene, in processes of their own; [] if it is refused."""
     seconds = []
+    command = [sys.executable, "-m", "patchfem", "run", scene, "-q", "-o", f"{work}/out"]
+    for _ in range(2):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        environment = os.environ | {"PATCHFEM_CACHE": f"{work}/cache"}
+        done = subprocess.run(command, cwd=work, env=environment, stderr=subprocess.DEVNULL)
+        if done.returncode:
+            return []
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return seconds
+
+
+def measure_first_run(name: str, folder: Path) -> Row:
+    """Measure the first and the second run of a scene of FIRST_RUNS below a folder."""
     with TemporaryDirectory(dir=folder) as work:
-        Path(work, "scene.toml").write_text(FIRST_RUNS[name], "utf-8")
-        command = [sys.executable, "-m", "patchfem", "run", "scene.toml", "-q"]
-        for _ in range(2):
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            environment = os.environ | {"PATCHFEM_CACHE": f"{work}/cache"}
-            subprocess.run(command, check=True, cwd=work, env=environment)
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            seconds.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-    return Row("first", name, seconds[0] - seconds[1], seconds[1])
+        scene = Path(work, "scene.toml")
+        scene.write_text(FIRST_RUNS[name], "utf-8")
+        first, second = measure_two_runs(scene, work)
+    return Row("first", name, first - second, second)
+
+
+def measure_all_scenes(name: str, folder: Path, share: float) -> Row:
+    """Measure the first and the second run of every shipped scene below a folder, and return their median.
+
+    Parameters
+    ----------
+    name : str
+        Name of the row.
+    folder : Path
+        Folder for the runs.
+    share : float
+        Number of scenes / that of all shipped scenes.
+    """
+    templates = Path(pf.__file__).with_name("scene") / "templates"
+    scenes = sorted([*templates.glob("*.toml"), *STUDIES.glob("*/*.toml")])
+    rows = []
+    for scene in scenes[:: max(1, round(1 / share))]:
+        with TemporaryDirectory(dir=folder) as work:
+            if seconds := measure_two_runs(scene, work):
+                rows.append((seconds[0] - seconds[1], seconds[1]))
+                print(
+                    f"{scene.parent.name}/{scene.name}: first run {seconds[0]:.2f} CPU s",
+                    flush=True,
+                )
+    print(f"compiling at most {max(rows)[0]:.2f} CPU s in {len(rows)} scenes")
+    return Row("scenes", name, *map(float, np.median(rows, axis=0)))
 
 
 # ---- a step and its bound
@@ -341,6 +379,7 @@ def main(
     folder = out.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     works = [partial(measure_first_run, name, folder) for name in FIRST_RUNS]
+    works += [partial(measure_all_scenes, "median", folder, share)]
     works += [partial(measure_step, name) for name in LAWS]
     works += [partial(measure_sweep, name, share) for name in SWEEPS]
     rows = []

@@ -9,13 +9,10 @@ from typing import NamedTuple
 from ...compiled.flags_kernels import NJIT_KERNEL
 from ...compiled.jit import njit
 from .list_math_kernels import fast_exp, power
-from .strip_rows_kernels import ListLaw
+from .strip_rows_kernels import N_CELLS_PER_AGE, N_COEFFICIENTS, ListLaw
 
 # Options of functions inside of loops
 NJIT_INLINE = NJIT_KERNEL | {"forceinline": True}
-# The table has this number of polynomials per unit of x, with 9 coefficients each; both lose nothing but round-off.
-N_CELLS_PER_AGE = 4
-N_COEFFICIENTS = 9
 MIN_AGE = 1e-300  # smallest age, at which the strength is finite for orders below 0
 # Largest relative difference of two ages between which a mean follows from the values at the ends: the errors of this rule
 # and of a difference of integrals are then 1e-13

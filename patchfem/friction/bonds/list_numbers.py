@@ -4,10 +4,17 @@ from math import ceil, gamma
 
 import numpy as np
 
-from .decay_kernels import N_CELLS_PER_AGE, N_COEFFICIENTS
 from .parameters import Bonds, growth_numbers
-from .strip_kernels import MAX_NEW_STRIPS
-from .strip_rows_kernels import N_STRIP_ENTRIES, BondLists, ListLaw, ListState, Strip
+from .strip_rows_kernels import (
+    MAX_NEW_STRIPS,
+    N_CELLS_PER_AGE,
+    N_COEFFICIENTS,
+    N_STRIP_ENTRIES,
+    BondLists,
+    ListLaw,
+    ListState,
+    Strip,
+)
 
 # Half the stretch [bond lengths] over which the initial bonds are distributed, so that their force has no jump
 INITIAL_HALF_WIDTH = 1e-6

@@ -7,7 +7,7 @@ from ...compiled.flags_kernels import NJIT_KERNEL
 from ...compiled.jit import njit
 from .decay_kernels import find_decay
 from .list_math_kernels import fast_exp
-from .strip_rows_kernels import ListLaw, ListState, Strip, read_strip, write_strip
+from .strip_rows_kernels import N_STRIP_ENTRIES, ListLaw, ListState, Strip
 from .strip_sum_kernels import GAUSS, Moved, find_ages, mix
 
 CONTIGUOUS_TOL = 1e-9  # round-off of the ends of two strips that formed one after the other, relative to their length
@@ -22,6 +22,20 @@ class Joint(NamedTuple):
 
     strip: Strip
     misfit: float
+
+
+@njit(**NJIT_KERNEL)
+def read_strip(strips, k):
+    """Return the `Strip` of number k in the array `strips` (capacity, 8)."""
+    row = strips[k]
+    return Strip(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7])
+
+
+@njit(**NJIT_KERNEL)
+def write_strip(strips, k, strip):
+    """Write a `Strip` to the number k of the array `strips` (capacity, 8)."""
+    for i in range(N_STRIP_ENTRIES):
+        strips[k, i] = strip[i]
 
 
 @njit(**NJIT_KERNEL)

@@ -12,8 +12,8 @@ from ...compiled.jit import njit
 from .decay_kernels import average_strength, find_moment
 from .list_math_kernels import power
 from .point_kernels import grow
-from .strip_join_kernels import join_strips
-from .strip_rows_kernels import ListLaw, ListState, Strip, read_strip, write_strip
+from .strip_join_kernels import join_strips, read_strip, write_strip
+from .strip_rows_kernels import MAX_NEW_STRIPS, ListLaw, ListState, Strip
 from .strip_sum_kernels import (
     GAUSS,
     Moved,
@@ -28,9 +28,8 @@ from .strip_sum_kernels import (
 )
 
 MIN_PATH = 1e-300  # path [m] below which a point rests
-# Largest growth J along a new strip, and largest number of these: in more of it nearly all bonds are mature
+# Largest growth J along a new strip: in more of it nearly all bonds are mature
 MAX_STRIP_GROWTH = 0.25
-MAX_NEW_STRIPS = 8
 # Largest change of the logarithm of the length of bonds along a part of an increment, and largest number of parts
 MAX_PART_CHANGE = 0.02
 MAX_PARTS = 64

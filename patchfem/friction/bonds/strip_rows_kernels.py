@@ -5,8 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled.flags_kernels import NJIT_KERNEL
-from ...compiled.jit import njit
+# The table of `decay_kernels` has this number of polynomials per unit of age, with 9 coefficients each; both lose nothing
+# but round-off.
+N_CELLS_PER_AGE = 4
+N_COEFFICIENTS = 9
+MAX_NEW_STRIPS = 8  # strips that a step adds to a list at most
 
 
 class Strip(NamedTuple):
@@ -31,20 +34,6 @@ class Strip(NamedTuple):
 
 
 N_STRIP_ENTRIES = len(Strip._fields)
-
-
-@njit(**NJIT_KERNEL)
-def read_strip(strips, k):
-    """Return the `Strip` of number k in the array `strips` (capacity, 8)."""
-    row = strips[k]
-    return Strip(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7])
-
-
-@njit(**NJIT_KERNEL)
-def write_strip(strips, k, strip):
-    """Write a `Strip` to the number k of the array `strips` (capacity, 8)."""
-    for i in range(N_STRIP_ENTRIES):
-        strips[k, i] = strip[i]
 
 
 class ListState(IntEnum):
