@@ -1,10 +1,15 @@
 """Ten checks of scenes with [contact.area] whose truths were fixed before the first run: rigid pieces on a layer of springs,
-Hertz, plane strain, symmetry and energy. Each value lies in its interval, which is as narrow as the tolerance asks for."""
+Hertz, plane strain, symmetry and energy. Each value lies in its interval, which is as narrow as the tolerance asks for.
+Then the plane limit, and the CPU time of the shipped pieces."""
+
+from time import process_time
 
 import numpy as np
 import pytest
 
 import patchfem as pf
+from patchfem.runs.patch import area
+from patchfem.slip.first_loading import make_cell_elements
 
 LOAD = 26 * 4.4482216152605  # N
 SIDE, HEIGHT = 12.7e-3, 6.35e-3  # m
@@ -147,3 +152,35 @@ def test_exact_work_of_rigid_faces_on_a_spring():
     )
     force = 0.3 * LOAD
     check(result, 1e-3, loop_area=4 * force * (1e-6 - force / 1e8), friction_force_peak=force)
+
+
+COATED = TITANIUM | {"coating": {"material": "WC-Co", "thickness": "6 mil"}}
+
+
+@pytest.mark.parametrize(
+    "shape", [{"crown": {"radius": "50 m"}}, {"tilt": {"angle": "0.1 mrad"}}], ids=["crown", "tilt"]
+)
+@pytest.mark.parametrize("n_cells", [200, 256])
+def test_exact_guided_face_is_the_plane_run(shape, n_cells):
+    """Between guides along y, a face agrees with the plane run within .1 %, wherever the edge lies between the cells."""
+    plane = BLOCK | COATED | shape
+    model = pf.build({"contact": plane}).patch
+    del plane["area"]
+    expected = pf.run({"contact": plane}).measures
+    cells = area.make_cells(model, n_cells, 1, "x")
+    values = area.compute_face_values(area.press_face(model, cells))
+    for name in ("contact_fraction", "normal_stiffness", "tangential_stiffness"):
+        assert values[name] == pytest.approx(expected[name].value, rel=1e-3), name
+
+
+@pytest.mark.slow
+def test_always_faces_are_pressed_in_time():
+    """The pieces press and slip in at most the CPU seconds that are allowed on one core."""
+    model = pf.build({"contact": BLOCK | COATED | {"shear": {}} | SHAPES}).patch
+    for n_cells, limit in ((128, 0.6), (256, 0.4), (512, 3.0)):
+        cells = area.make_cells(model, n_cells, 1)
+        start = process_time()
+        patch = area.press_face(model, cells)
+        if n_cells == 128:
+            make_cell_elements(patch.slip_compliance, 0.3 * patch.pressed.pressure)
+        assert process_time() - start <= limit

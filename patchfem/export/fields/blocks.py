@@ -84,7 +84,10 @@ def make_blocks(pieces: Pieces) -> dict[str, Block]:
 
 
 def make_face_blocks(result) -> dict[str, Block]:
-    """Return the cells of the face of a run with [contact.area] as the block of the interface."""
+    """Return the cells of the face of a run with [contact.area] as the block of the interface.
+
+    Quadrilaterals serve the writer, the readers and the film of both pieces; image data would need others.
+    """
     patch = result.patch
     rows, columns = patch.shape
     pieces = patch.model.pieces
