@@ -11,7 +11,6 @@ this stiffness, in the modes and in the patch, so that this error enters the err
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from ..model.model import Model
 from ..model.source import Source, locate_errors
 from ..model.structure import compute_sticking_stiffness
 from ..slip.edge_springs import add_edge_springs
-from .patch import mesh_levels, store
+from .patch import mesh_levels
 from .patch.jenkins_elements import compute_stick_stiffness
 from .patch.press import Patch, Patches
 
@@ -77,8 +76,6 @@ def solve_without_joint(model: Model) -> FreeRig:
 def solve_patch(model: Model, solved: Patches = ()) -> Patches:
     """Return the patch of a model on its meshes, from fine to coarse.
 
-    The patch of a bolted joint is solved once for the plan, the run and all cases of a study.
-
     Parameters
     ----------
     model : Model
@@ -86,13 +83,7 @@ def solve_patch(model: Model, solved: Patches = ()) -> Patches:
     solved : tuple
         Patches of an earlier pass, from fine to coarse, whose meshes are refined further.
     """
-    tolerance = model.accuracy.tolerance
-    solve = partial(mesh_levels.solve_with_coarser, model.patch, tolerance, solved=solved)
-    # The joint of a model may have been subtracted already.
-    if model.rig is None or model.rig.structure.bolted is None:
-        return solve()
-    key = ("bolted patch", store.content_key(model.patch), tolerance)
-    return store.get_or_compute(key, solve)
+    return mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, solved=solved)
 
 
 def find_source(model: Model) -> Source:

@@ -14,7 +14,7 @@ from ...friction import record
 from ...slip import fields as slip_fields
 from ..results.interfaces import Face
 from ..results.result import SlipRule, collect_rest_frame, make_interface_frames
-from . import mesh_levels, store
+from . import mesh_levels
 from .jenkins_elements import PatchElements, make_elements
 from .press import Patches
 
@@ -39,20 +39,13 @@ def solve_interface_patches(model) -> Iterator[Face]:
 def solve_contact_on_meshes(interface, tolerance: float) -> Patches:
     """Solve the contact of an interface on its mesh and on coarser meshes.
 
-    Runs with equal patches use one cached solution. The solution of a patch with files is cached
-    for its own model only, because the files may change.
-
     Raises
     ------
     PatchfemError
         With the scene key of the interface that is in error.
     """
-    patch_model = interface.patch
-    key = ("face", store.content_key(patch_model), tolerance)
     try:
-        return store.get_or_compute(
-            key, lambda: mesh_levels.solve_with_coarser(patch_model, tolerance)
-        )
+        return mesh_levels.solve_with_coarser(interface.patch, tolerance)
     except PatchfemError as error:
         error.key = error.key and f"{interface.key}.{error.key}"
         raise

@@ -60,11 +60,13 @@ def solve_with_coarser(
         has the static measures with the errors that follow from all of them (`Patch.measures`).
     """
     mesh = patch_model.mesh
-    if patch_model.area is not None:
-        return solved or area.solve_face_on_grids(patch_model, tolerance, with_errors=with_errors)
 
     def solve() -> Patches:
         """Solve the patch on its own meshes, on those that the scene prescribes, or on those that cases share."""
+        if patch_model.area is not None:
+            return solved or area.solve_face_on_grids(
+                patch_model, tolerance, with_errors=with_errors
+            )
         if mesh.shared is None and mesh.is_automatic:
             return solve_on_refined_meshes(patch_model, tolerance, with_errors, solved)
         levels = (mesh.shared or make_given_meshes(patch_model))[: None if with_errors else 1]
@@ -84,9 +86,10 @@ def solve_with_coarser(
         return solve()
     key = ("patches", store.content_key(patch_model), tolerance, with_errors)
     patches = store.get_or_compute(key, solve)
-    is_profile_shared = mesh.shared is not None and patch_model.gap.profile is not None
-    is_missed = max_mesh_error_ratio(patches[0].measures, tolerance) > 1
-    if mesh.is_automatic and is_profile_shared and is_missed:
+    has_profile = (
+        mesh.is_automatic and mesh.shared is not None and patch_model.gap.profile is not None
+    )
+    if has_profile and max_mesh_error_ratio(patches[0].measures, tolerance) > 1:
         return solve_on_refined_meshes(patch_model.with_mesh(shared=None), tolerance)
     return patches
 
