@@ -220,9 +220,9 @@ def describe_loop_fit(fitted: FittedKeys) -> Parts:
     }
     if loop.time is not None:
         columns["time"] = (loop.time, "s")
-    if held_out.any():  # these rows are drawn and scored apart
-        scores["held_out_rms"] = Quantity(fitted.compute_rms(held_out), unit)
+    if held_out.any():  # these rows are drawn apart
         columns["held_out"] = (np.where(held_out, loop.reading, np.nan), unit)
+    scores |= {name: Quantity(rms, unit) for name, rms in fitted.score_predictions().items()}
     details = {"step_error": comparison.step_error, "steps_between_rows": comparison.steps_per_row}
     return Parts(residual, scores, make_columns("row", columns), details)
 
@@ -261,6 +261,7 @@ def describe_curve_fit(fitted: FittedKeys) -> Parts:
     )
     if comparison.is_assumed.any():
         residual += " The errors of the measured values are their scatter around the fit."
+    scores |= {name: Quantity(rms) for name, rms in fitted.score_predictions().items()}
     data = make_columns("row", columns) | make_columns("curve_amplitude", curve)
     return Parts(residual, scores, data, {"method": comparison.method})
 

@@ -121,7 +121,12 @@ QUANTITIES: dict[str, Definition] = {
         "1", "root mean square of fitted minus measured values, over the largest measured value"
     ),
     "held_out_rms": Definition(
-        "1", "root mean square of predicted minus measured values of the rows that are held out"
+        "1",
+        "root mean square of predicted minus measured values of the rows held out; of a curve in standard deviations",
+    ),
+    "left_out_rms": Definition(
+        "1",
+        "the same of each row in the fit without it and the others with its value in this column",
     ),
     "work_measured": Definition("J", "work of the measured force over the fitted rows"),
     "work_fitted": Definition("J", "work of the fitted force over the fitted rows"),

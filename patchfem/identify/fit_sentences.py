@@ -32,9 +32,8 @@ def describe_fit(fit: Fit, names, bounds=()) -> list[str]:
     sentences = []
     for name, side, (low, high) in zip(names, fit.at_bound, bounds):
         if side:
-            bound = low if side == "low" else high
             sentences.append(
-                f"{name} is at its {side} bound {bound}: widen the range, or try another law"
+                f"{name} is at its {side} bound {low if side == 'low' else high}: widen the range, or try another law"
             )
 
     # Parameters in an undetermined combination are reported with it, not one by one.

@@ -171,12 +171,18 @@ class Problem:
             model.is_expensive = True
         rms = np.sqrt(best.cost / best.rows)
         n_confirming = np.count_nonzero(descent_rms <= SAME_MINIMUM_RATIO * rms)
-        is_converged = best.is_converged or n_confirming > 1
-        outcome = Outcome.DONE if is_converged else Outcome.NOT_CONVERGED
+        is_done = best.is_converged or n_confirming > 1
         if self.earlier_rms is not None:
             descent_rms = self.earlier_rms
-        values = model.space.to_values(best.u)
-        return Fit(values, _name_bounds(best.u), None, rms, model.counts, outcome, descent_rms)
+        return Fit(
+            values=model.space.to_values(best.u),
+            at_bound=_name_bounds(best.u),
+            intervals=None,
+            rms=rms,
+            counts=model.counts,
+            outcome=Outcome.DONE if is_done else Outcome.NOT_CONVERGED,
+            descent_rms=descent_rms,
+        )
 
     def add_intervals(self, fit: Fit, kind: str) -> Fit:
         """Return a fit of this problem with the 95 % intervals of its values.

@@ -165,7 +165,7 @@ def test_exact_excluded_rows_do_not_change_the_fit(tmp_path):
         FitOptions(["cycle=2.0"]),
     )
     assert result.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and result.fit.rms < 1e-6
-    assert result.compute_rms(result.held_out) == pytest.approx(
+    assert result.score_predictions()["held_out_rms"] == pytest.approx(
         np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6
     )
     assert result.held_out.sum() == 40

@@ -141,7 +141,9 @@ def test_steps_give_stated_gain_and_scores(tmp_path, capsys):
         ("fitted", "143 Hz ({:.3f} instead of {:.3f})"),
         ("held_out", "other frequencies ({:.3f} instead of {:.3f})"),
     ):
-        scores = [fits[free].compute_scores()[part]["all"] for free in (True, False)]
+        scores = [
+            fits[free].comparison.compute_scores(fits[free])[part]["all"] for free in (True, False)
+        ]
         assert_contains(steps.ANSWER, words.format(*scores))
     for row in found.values():
         *first, last = [f"{step.gauge:.3f}" for step in row]

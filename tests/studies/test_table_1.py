@@ -30,8 +30,8 @@ def check_scores(scores, expected, within=0.0011):
 def test_table_1_fit_of_the_second_path_at_143_hz(point, wanted, values):
     """From 8 random starts, the fit reaches the optimum of an independent program."""
     fit = load_study("table_1/second_path.py").fit_path(point)
-    check_scores(fit.compute_scores(), wanted)
-    assert fit.keys.fit.values == pytest.approx(values, rel=2e-3)
+    check_scores(fit.comparison.compute_scores(fit), wanted)
+    assert fit.fit.values == pytest.approx(values, rel=2e-3)
 
 
 def test_table_1_scores_of_the_rigid_coulomb_block():

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import PatchfemError
+from ...formatting import format_length
 from ...inputs.damage import shorten
 from ...scene.keys.quantities import parse_quantity
 
@@ -95,6 +96,8 @@ def format_cell(name: str, cell: float | str) -> str:
     """Return the text of a cell in the column `name`: a label, or a number with its unit."""
     if isinstance(cell, str):
         return cell or "(none)"
+    if name == "amplitude":
+        return format_length(cell, 6)
     return f"{cell:.6g} {NUMBER_UNITS[name][1]}"
 
 
@@ -110,7 +113,7 @@ def group_by_column(
     path : Path
         Table, for messages.
     columns : Mapping
-        As in `select_held_out`.
+        Column -> its n cells: labels, or numbers [SI].
     selected : (n,) bool array
         Rows that are grouped.
 

@@ -227,10 +227,18 @@ class FittedKeys:
         """The ``table.key=value`` strings of the fitted scene."""
         return [*self.keys.sets, *self.keys.assign(self.fit.values)]
 
-    def compute_rms(self, mask: np.ndarray) -> float | None:
-        """Return the root mean square residual of the values in a mask (r,); None if there are none."""
-        residual = self.comparison.compare(self.computed)[mask]
-        return np.sqrt(np.mean(residual**2)) if residual.size else None
+    def score_predictions(self) -> dict[str, float]:
+        """Return the root mean square residual of the values that are held out and of those left out in turn, by name."""
+        predictions = {
+            "held_out_rms": np.where(self.held_out, self.computed, np.nan),
+            "left_out_rms": self.left_out,
+        }
+        scores = {}
+        for name, computed in predictions.items():
+            residual = self.comparison.compare(computed)
+            if np.isfinite(residual).any():
+                scores[name] = np.sqrt(np.nanmean(residual**2))
+        return scores
 
 
 def fit_keys(
