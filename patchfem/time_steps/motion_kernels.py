@@ -65,25 +65,6 @@ def sum_products(first, second):
 
 
 @njit(**NJIT_CALL)
-def sum_triples(first, second, third):
-    """Return the sum of the products of the entries of three arrays.
-
-    Parameters
-    ----------
-    first : (m,) array
-        First factors.
-    second : (m,) array
-        Second factors.
-    third : (m,) array
-        Third factors.
-    """
-    total = 0.0
-    for j in range(third.size):
-        total += first[j] * second[j] * third[j]
-    return total
-
-
-@njit(**NJIT_CALL)
 def move_freely(system, level, drive, row, fraction):
     """Compute the motion in a step as if no interface acted: row 1 of `system.state`, and four rows of `Port`.
 
