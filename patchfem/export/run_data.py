@@ -15,7 +15,7 @@ import numpy as np
 from .. import inputs, response, structure
 from ..core import PatchfemError, SineDrive
 from ..model import structure as structure_model
-from ..runs.accuracy_curve import compute_accuracy_curve
+from ..runs.findings import compute_accuracy_curve
 from ..runs.patch import area_motion
 from ..runs.results.result import Result, patch_surface
 from .answer import Quantities, Quantity, Variable, Variables, encode_texts, make_columns
@@ -468,7 +468,7 @@ def _collect_levels(result: Result) -> Variables:
         "level_stuck": (np.array([level.stuck for level in levels], np.int8), "", STICK_STATE_TEXT),
     }
     table = response.rows.MOTION_TABLE
-    for name in response.levels.LEVEL_MEASURES:
+    for name in response.events.LEVEL_MEASURES:
         if any(name in level.values for level in levels):
             unit = table[name].unit
             values = [level.values.get(name, np.nan) for level in levels]

@@ -12,17 +12,16 @@ it:
 6.  `rig`  a driven structure with friction
 7.  `wear`  wear of a patch in a bench or a rig over many cycles
 8.  `findings`  measures that miss the tolerance, the advice that reduces their errors, and balances
-9.  `accuracy_curve`  accuracy of a motion against its computing time
-10. `plan`  what would run: engine, unknowns, stiffnesses, memory
-11. `run`  from a plan to its result
-12. `probe`  one run without error estimates, with its measured time
-13. `pieces`  displacement and stress inside both pieces, and where they yield
-14. `batch`  many models in one batch
+9.  `plan`  what would run: engine, unknowns, stiffnesses, memory
+10. `run`  from a plan to its result
+11. `probe`  one run without error estimates, with its measured time
+12. `pieces`  displacement and stress inside both pieces, and where they yield
+13. `batch`  many models in one batch
 """
 
 # names that other folders use, by module
 PUBLIC = {
-    "accuracy_curve": ("compute_accuracy_curve",),
+    "findings": ("compute_accuracy_curve",),
     "batch.batches": (
         "MIN_CHUNK_CASES",
         "find_group",

@@ -326,11 +326,6 @@ class Patch:
         return self.model.interface.skin is not None
 
     @property
-    def has_smooth_skin(self) -> bool:
-        """Whether the pieces carry pressure at every separation, through a nonlinear asperity layer."""
-        return self.has_skin and self.model.interface.skin.law != "linear"
-
-    @property
     def active(self) -> np.ndarray:
         """Contact set (m,) of bool: whether each node carries pressure."""
         return self.pressure.sigma_n > 0

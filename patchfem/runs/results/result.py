@@ -190,7 +190,7 @@ class MotionData(NamedTuple):
     - period: period of the drive [s].
     - energies: energies [J] and counters by name.
     - step_runs: `errors.StepRun` of the run and of its runs with fewer steps, from fine to coarse.
-    - levels: `levels.Level` of each drive level.
+    - levels: `events.Level` of each drive level.
     - events: stick-slip Events.
     - decay: DecayCurve of a release.
     - spectra: Spectra under a random drive.

@@ -20,11 +20,14 @@ from ...formatting import format_length
 from ...motion_measures import find_extremes
 from ...response.decay_curve import measure_last_cycle_amplitude
 from ...response.errors import ComparisonRuns, estimate_errors, split_errors
-from ...response.events import Events, VibratingMode, is_all_stuck, join_events
-from ...response.levels import (
+from ...response.events import (
     LEVEL_MEASURES,
+    Events,
     Level,
+    VibratingMode,
     bracket_onset,
+    is_all_stuck,
+    join_events,
     make_no_onset_reason,
     make_onset_test,
 )
