@@ -272,19 +272,20 @@ def describe_rows_fit(fitted: FittedKeys) -> Parts:
     Its scores are root mean squares of ln(computed/measured).
     """
     comparison = fitted.comparison
-    cells = comparison.cells
     search = fitted.fit
     all_scores = comparison.compute_scores(fitted)
     totals = {name: score["all"] for name, score in all_scores.items() if score is not None}
-    if not cells.unstable.any():
-        del totals["stable"]
     texts = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in totals.items() if value]
     residual = (
         f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.descent_rms.size} starts "
         "led to within 1 % of the best."
     )
     scores = {f"score_{name}": Quantity(value) for name, value in totals.items()}
-    return Parts(residual, scores, _collect_rows(fitted), {"sensor_scores": all_scores})
+    details = {
+        "scores": all_scores,
+        "scores_stable": comparison.compute_scores(fitted, only_stable=True),
+    }
+    return Parts(residual, scores, _collect_rows(fitted), details)
 
 
 def _collect_rows(fitted: FittedKeys) -> Variables:

@@ -145,9 +145,6 @@ QUANTITIES: dict[str, Definition] = {
     "score_left_out": Definition(
         "1", "root mean square of ln(computed/measured) of each reading in the fit without it"
     ),
-    "score_stable": Definition(
-        "1", "score of the readings that were fitted, without those flagged U (unstable)"
-    ),
     "fitted_depth": Definition("m", "worn depth computed with the fitted coefficient"),
     # cost
     "cpu_time": Definition("s", "CPU time of the scene as it is, with its error estimates"),

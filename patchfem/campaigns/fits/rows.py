@@ -77,7 +77,7 @@ class RowsComparison(Comparison):
         n_unstable = int(cells.unstable.sum())
         if n_unstable:
             warnings.append(
-                f"{n_unstable} readings flagged U (unstable) count in the fit as lower bounds; score_stable leaves these "
+                f"{n_unstable} readings flagged U (unstable) count in the fit as lower bounds; scores_stable leaves these "
                 "readings out"
             )
 
@@ -98,17 +98,27 @@ class RowsComparison(Comparison):
             )
         return warnings
 
-    def compute_scores(self, fitted: FittedKeys) -> dict[str, dict | None]:
-        """Return the scores of the "fitted", the "held_out", the "left_out" and the "stable" fitted readings.
+    def compute_scores(
+        self, fitted: FittedKeys, *, only_stable: bool = False
+    ) -> dict[str, dict | None]:
+        """Return the scores of the "fitted", the "held_out" and the "left_out" readings (`cells.compute_rms_scores`).
 
-        They are as in `cells.compute_rms_scores`; the "stable" ones leave out the readings flagged U.
+        Parameters
+        ----------
+        fitted : FittedKeys
+            Fitted values, with the readings that they compute.
+        only_stable : bool
+            Whether to leave out the readings flagged U (unstable).
         """
+        counts = ~self.cells.unstable if only_stable else np.ones(fitted.held_out.size, bool)
         logs = self.cells.compute_logs(fitted.computed)
         left_out = self.cells.compute_logs(fitted.left_out)
-        training = ~fitted.held_out
+        groups = {
+            "fitted": (logs, ~fitted.held_out),
+            "held_out": (logs, fitted.held_out),
+            "left_out": (left_out, ~np.isnan(left_out)),
+        }
         return {
-            "fitted": compute_rms_scores(self.cells, logs, training),
-            "held_out": compute_rms_scores(self.cells, logs, fitted.held_out),
-            "left_out": compute_rms_scores(self.cells, left_out, ~np.isnan(left_out)),
-            "stable": compute_rms_scores(self.cells, logs, training & ~self.cells.unstable),
+            name: compute_rms_scores(self.cells, values, counts & is_in_group)
+            for name, (values, is_in_group) in groups.items()
         }
