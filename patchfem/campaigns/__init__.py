@@ -32,10 +32,7 @@ PUBLIC = {
         "fit_measurement",
     ),
     "fits.rows": ("RowsComparison",),
-    "fits.wear": (
-        "COEFFICIENT_KEY",
-        "DepthComparison",
-    ),
+    "fits.wear": ("DepthComparison",),
     "numerical_settings": (
         "NUMERICAL_SETTINGS",
         "find_applicable_settings",

@@ -12,7 +12,6 @@ PUBLIC = {
         "LOADING_KEYS",
     ),
     "files": ("find_file_faults",),
-    "gap": ("find_shape_side",),
     "law": (
         "InterfaceLaw",
         "make_bond_parameters",

@@ -35,8 +35,8 @@ def make_bonds(law: Bonds):
     is_first_order = law.reading == "stretch" and law.order == 1
     bond_sum = None if is_first_order else BondSum(law, cutoff_age(law.order, CUT_OFF), 0.0)
     points = laws.make_bonds(law, 1.0) if is_first_order else laws.make_list(law, 1.0)
-    point_sets = [PointSet(points, np.zeros(0))]
-    return lambda load: Contact(point_sets, law.static, law.length, load=load, bond_sum=bond_sum)
+    point_sets = [PointSet(points, np.zeros(0), bond_sum=bond_sum)]
+    return lambda load: Contact(point_sets, law.static, law.length, load=load)
 
 
 def make_springs(stiffness, yield_slide):

@@ -94,8 +94,8 @@ def printed_law_cycle(amplitude: float, order: float, steps: int, **growth) -> C
     """
     law = bonds(order=order, reading="report", **growth)
     bond_sum = BondSum(law, cutoff_age(order, 1e-5), 0.01)
-    points = PointSet(make_list(law, 1.0), np.ones(1))
-    contact = Contact([points], law.static, law.length, bond_sum=bond_sum)
+    points = PointSet(make_list(law, 1.0), np.ones(1), bond_sum=bond_sum)
+    contact = Contact([points], law.static, law.length)
     return last_cycle(contact, amplitude, steps)
 
 

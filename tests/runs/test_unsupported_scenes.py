@@ -91,11 +91,6 @@ REFUSALS = [
         r"use law 'coulomb' instead, or use accuracy\.method = \"march\"",
     ),
     (
-        PAIR + FORCED,
-        "structure.interface.1.law=nonlocal; structure.interface.1.bond_length=1 um; structure.interface.1.order=2",
-        r"structure.interface\[2\].law: law 'nonlocal' of order 2 with other interfaces is not supported",
-    ),
-    (
         COULOMB_RIG,
         FREE + "structure.travel=0.4 mm; accuracy.method=exact",
         r"starts beyond this travel",
@@ -173,11 +168,6 @@ REFUSALS = [
         COATED + COULOMB + STRUCTURE,
         "structure.mode.axial.yaw=30 rad/m",
         "axial.yaw: .*contact.area",
-    ),
-    (
-        FACE_RIG,
-        BONDS + "friction.order=2; structure.mode.axial.yaw=30 rad/m",
-        r"structure\.mode\.axial\.yaw: not supported yet with contact\.area and law 'nonlocal' of order 2",
     ),
     (
         FACE_RIG,
@@ -259,11 +249,6 @@ REFUSALS = [
         r"contact.grooves: not supported yet with \[\[structure.interface\]\]; leave out this entry",
     ),
     (CHAIN, "structure.interface.0.load=5 N", "`load` and `contact` exclude each other"),
-    (
-        CHAIN,
-        f"{FACE}crown.radius=2 m; {FACE}crown.on=lower",
-        "put the shapes on the upper piece",
-    ),
     (
         CHAIN,
         "structure.interface.0.kinetic=0.2",

@@ -49,7 +49,7 @@ def test_always_scene_refused_by_release_1_5_is_refused_at_the_same_places():
     """Each of 319 recorded scenes is refused with file, line and key of every mistake that 1.5 named.
 
     Since 1.11 the method of levels by harmonic balance is one of them, and since 1.15 the key `accuracy.harmonics`. Wear
-    with method `harmonic` and laws under a load that changes, which 1.5 refused too, run since 3.0.
+    with method `harmonic`, and laws with effects that 1.5 refused, run since 3.0.
     """
     rows = read_json(Path(__file__).with_name("faulty_scenes.json"))
     assert len(rows) == 319
