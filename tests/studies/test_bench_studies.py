@@ -60,6 +60,6 @@ def test_exact_ageing_is_exponential_and_bounds_the_friction_peak(tmp_path):
     }
     assert ageing_in_peak == pytest.approx({0.5: 0.28, 5.0: 0.68}, abs=5e-3)
     report_rows = [row for row in rows if row["reading"] == "report"]
-    assert report_rows[-1]["before"] == pytest.approx(0.517, abs=1e-3) and report_rows[-1][
-        "rested"
-    ] == pytest.approx(1, 1e-6)
+    assert report_rows[-1]["before"] == pytest.approx(0.517, abs=1e-3)
+    # The bonds beyond the cut-off carry 1e-6 of the friction limit.
+    assert report_rows[-1]["rested"] == pytest.approx(1 - 1e-6, abs=1e-8)
