@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray
 from command_line import read_json, read_page
+from scene_texts import FORCED, PAIR, RIG
 
 from patchfem.core import G_N, Response
 
@@ -26,6 +27,20 @@ substrate = {young = "120 GPa", poisson = 0.3, density = "4400 kg/m^3"}
 height = "35 nm"
 wavelength = "1.27 mm"
 """
+# Scenes with their laws by name, and the keys of an effect; a small change of the load leaves the laws alike.
+FACE = RIG[: RIG.index("[friction]")] + "{}" + RIG[RIG.index("[structure]") :]
+EFFECTS = {
+    "partial_slip": (FACE, "--set contact.shear={}"),
+    "load": (
+        '[normal]\nload = "115 N"\n{}' + RIG[RIG.index("[structure]") :],
+        "--set 'normal.amplitude=0.01 N' --set 'normal.frequency=286 Hz'",
+    ),
+    "pitch": (FACE, "--set 'structure.mode.axial.pitch=0.002 rad/m'"),
+    "interfaces": (PAIR + FORCED, ""),
+}
+LAW = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "1 um"\n'
+NEW_LAW = 'law = "dahl"', 'stiffness = "2e7 N/m"', "exponent = 1"
+SAME_LAW = 'law = "lugre"', 'stiffness = "2e7 N/m"', 'stribeck_speed = "1 m/s"'
 AVERAGE = 115 / 12.7e-3**2  # mean pressure of this scene [Pa]
 LIMIT, LENGTH = (
     0.3 * 115,
@@ -92,6 +107,55 @@ def assert_loop_matches_closed_form(found: dict) -> None:
 def test_exact_law_of_page_agrees_with_closed_form(law_folder):
     """The loop area and the peak force of the added law agree with their closed form within 2e-4."""
     assert_loop_matches_closed_form(read_measures(law_folder / "dahl"))
+
+
+def write_law(text: str, law: tuple) -> str:
+    """Return a scene whose friction laws are replaced by the lines of another one."""
+    kind, stiffness, last = law
+    text = text.replace('law = "elastic-plastic"', f"{kind}\n{last}")
+    return re.sub('bond_length = ".*"', stiffness, text)
+
+
+@pytest.fixture(scope="module")
+def marched_folder(tmp_path_factory):
+    """Return a copy of the package with the law and its time steps, where both laws have run with each effect."""
+    folder = tmp_path_factory.mktemp("marched")
+    page = PAGE.replace('"harmonic", "timeless"', '"harmonic march", "timeless"')
+    assert page != PAGE
+    steps = Path(__file__).with_name("added_law.md").read_text("utf-8")
+    adding.copy_package(folder, page + steps)
+    lines = []
+    for effect, (text, keys) in EFFECTS.items():
+        for name, law in (("new", NEW_LAW), ("same", SAME_LAW)):
+            scene = f"{effect}_{name}"
+            (folder / f"{scene}.toml").write_text(write_law(text.format(LAW), law), "utf-8")
+            lines.append(
+                f"run {scene}.toml {keys} --set accuracy.method=march --set drive.cycles=6 --no-page "
+                f"-o {scene}"
+            )
+    sweep = lines[0].replace("run", "sweep", 1).removesuffix("partial_slip_new")
+    lines.append(f"{sweep}sweep --over friction.static=0.2,0.3")
+    adding.run_commands(folder, lines)
+    return folder
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_added_law_of_exponent_one_agrees_with_dahl_under_effect(marched_folder, effect):
+    """By time steps the added law with n = 1 has the loop of Dahl's law, that of LuGre without damping."""
+    found = read_measures(marched_folder / f"{effect}_new")
+    other = read_measures(marched_folder / f"{effect}_same")
+    for name in ("relative_displacement_amplitude", "loop_area"):
+        error = found[name]["error"] + other[name]["error"]
+        assert 0 < error < 5e-3 * other[name]["value"], name
+        assert abs(found[name]["value"] - other[name]["value"]) <= error, name
+
+
+def test_sweep_of_added_law_agrees_with_single_run(marched_folder):
+    """A sweep of the added law has the loop area of the single run."""
+    areas = xarray.load_dataset(marched_folder / "sweep/sweep.nc").loop_area.values
+    single = read_measures(marched_folder / "partial_slip_new")["loop_area"]
+    assert areas[1] == pytest.approx(single["value"], abs=2 * single["error"])
+    assert abs(areas[0] - areas[1]) > 10 * single["error"]
 
 
 @pytest.mark.slow
