@@ -512,22 +512,8 @@ def suggest_laws(feature: str, other_features: str = "", friction=None) -> str:
     return f"use {instead}law {join_words(quoted, 'or')}"
 
 
-REMEDIES = {  # advice by name, for two effects that cannot be combined
-    "kinetic": "leave out the key kinetic",
-    "shapes": "put the shapes on the upper piece",
-    "either": "leave one of the two out",
-    "out": "leave out this entry",
-    "linear": "use 'linear'",
-    "march": "use 'march'",
-}
-
-
-def describe_unsupported(combination: str, alternative: str) -> str:
-    """Return the message for a combination of effects that is not supported.
-
-    `alternative` is a key of REMEDIES, or the advice itself.
-    """
-    remedy = REMEDIES.get(alternative, alternative)
+def describe_unsupported(combination: str, remedy: str) -> str:
+    """Return the message for a combination of effects that is not supported, with its remedy."""
     if combination.startswith(("beside ", "with ", "in ")):
         return f"not supported yet {combination}; {remedy}"
     return f"{combination} is not supported yet; {remedy}"

@@ -430,7 +430,7 @@ MOTION_MEASURE_ROWS = (
         "J",
         1e-10,
         "energy stored in the interface at the end of a run on a bench: elastic energy and, with "
-        "grooves, the potential energy of the load",
+        "grooves, the energy that the load has taken up",
         group="energy",
         friction_scale=lambda scale: scale.limit * scale.bond_length,
     ),

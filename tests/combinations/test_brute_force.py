@@ -247,6 +247,11 @@ SUPPORTED = {
         2000,
         ("stiffness", "iwan", "bouc-wen", "lugre"),
     ),
+    "bench with grooves and load": (
+        POINT + AMPLITUDE_OF_LOAD + GROOVES.format("normal") + "{}" + BENCH,
+        2000,
+        ("coulomb", "tanh"),
+    ),
     "bench with shear": (
         PATCH + SHEAR + "{}" + BENCH,
         400,

@@ -124,8 +124,8 @@ def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
         return PAIR + FORCED, words | {"law": law, "patch": f"{law}.contact"}
     if features & POINT_FEATURES:
         words |= {"load": "normal", "change": SETS["normal.amplitude"]}
-        return (BENCH if "bench" in features else POINT_RIG), words
-    return (PATCH_BENCH if "bench" in features else RIG), words
+        return POINT_RIG, words
+    return RIG, words
 
 
 def list_refusals(names: str) -> list[str]:
@@ -184,16 +184,3 @@ def test_refuses_each_cause_of_a_feature(text, changes, words):
     with pytest.raises(SceneError) as refused:
         loads(text, "a.toml", [write_blanks(change) for change in changes.split()])
     assert any(words in message for message in refused.value.mistakes), refused.value.mistakes
-
-
-# Two rows that apply to a scene at the same key: (features of both, the key, end of the only message at it).
-OVERLAPS = [
-    ("normal.amplitude, bench, law for flat faces, normal.grooves", "normal.amplitude", "leave one of the two out"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("names, key, advice", OVERLAPS)
-def test_prints_the_row_whose_advice_suffices(names, key, advice):
-    """Of two rows at the same key, that one is printed whose advice also removes the cause of the other."""
-    (message,) = [text for text in list_refusals(names) if f": {key}: " in text]
-    assert message.endswith(advice)

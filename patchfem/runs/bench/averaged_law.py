@@ -108,7 +108,7 @@ def slip_force_ratio(keys, patch) -> float:
             describe_unsupported(
                 f"law '{keys.law}' with a pressure that is not symmetric (slip force {forward * keys.static:.6g} N "
                 f"forward, {back * keys.static:.6g} N back)",
-                "march",
+                "use 'march'",
             ),
             "accuracy.method",
         )

@@ -138,8 +138,8 @@ def _follow_without_memory(task: SlideTask) -> SlideHistories:
         force, losses = _slide_on_flat_surfaces(task, load)
     else:
         force, losses = _climb_grooves(task, load)
-        rises = load[1:] * grooves.height_difference(slide[:-1], slide[1:])
-        stored = load * grooves.height(slide)
+        rises = _average_steps(load) * grooves.height_difference(slide[:-1], slide[1:])
+        stored = load[0] * grooves.height(slide[0]) + np.append(0.0, np.cumsum(rises))
 
     # A force at the end of a rest is that of the motion that begins there.
     static = model.friction.static
@@ -249,6 +249,7 @@ def _climb_grooves(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
     grooves = task.model.grooves
     friction = task.model.friction
     moves = np.diff(slide)
+    mean_load = _average_steps(load)
     if law_has_trait(friction.law, "set-valued"):
         back, forward = (_find_limits(task, load, sign) / load for sign in (-1.0, 1.0))
         # Index of the last step in which the interface moved, up to each step; -1 before the first one.
@@ -258,9 +259,8 @@ def _climb_grooves(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
         # Before the motion starts, the friction on the flank balances the load as far as its limit allows.
         lowest, highest = grooves.force_ratio(slide[0], np.array([-1.0, 1.0]), friction.static)
         ratio[direction == 0] = np.clip(0.0, lowest, highest)
-        # The load is constant, and so are both coefficients.
         losses = [grooves.friction_loss(slide[:-1], slide[1:], part[0]) for part in (back, forward)]
-        return load * ratio, load[1:] * np.where(moves < 0, *losses)
+        return load * ratio, mean_load * np.where(moves < 0, *losses)
 
     durations = np.diff(task.time)
     speed = np.divide(moves, durations, out=np.zeros_like(moves), where=durations > 0)
@@ -274,10 +274,15 @@ def _climb_grooves(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
     def find_loss(places) -> np.ndarray:
         """Return the dissipated energy per displacement [N] in each step, at places (k - 1,) [m]."""
         t, phi = find_flank(places, speed)
-        return load[1:] * phi * (1 + t**2) / (1 - phi * t)
+        return mean_load * phi * (1 + t**2) / (1 - phi * t)
 
     t, phi = find_flank(slide, np.append(0.0, speed))
     return load * (t + phi) / (1 - phi * t), integrate_steps(slide, find_loss)
+
+
+def _average_steps(values) -> np.ndarray:
+    """Return the means (k - 1,) of values (k,) over the steps."""
+    return 0.5 * (values[:-1] + values[1:])
 
 
 def integrate_steps(slide, integrand) -> np.ndarray:

@@ -390,4 +390,4 @@ def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> s
         if joint is not None and not (motion.grooves or law_supports(joint.law, "harmonic")):
             remedy = f"use 'march', or {suggest_laws('harmonic', friction=joint.law)}"
             return describe_unsupported(f"'harmonic' with {describe_law(joint.law)}", remedy)
-    return feature and describe_unsupported(f"'harmonic' {feature}", "march")
+    return feature and describe_unsupported(f"'harmonic' {feature}", "use 'march'")

@@ -1,6 +1,6 @@
 """Combinations of effects that a scene may contain but no run can compute: the table UNSUPPORTED_COMBINATIONS.
 
-Each row of support.toml names two or more features and says what to do instead; LIMITS.md lists the rows and defines the
+Each row of support.toml names features and says what to do instead, and why; LIMITS.md lists the rows and defines the
 features. A feature is a key (`structure.stiffening`), a key with a value (`drive.kind=free`) or a row of JOINT_FEATURES;
 keys of the patch of a joint begin with `patch`. To support a combination, delete its row. What single engines of a rig can
 compute stands in `methods`.
@@ -176,7 +176,6 @@ class Feature(NamedTuple):
 
 JOINT_FEATURES = {
     # kinds of scenes and drives
-    "bench": Feature(lambda j: j.kind == "bench"),
     "rig": Feature(lambda j: j.kind == "rig"),
     "load on a point": Feature(lambda j: j.scene.normal),
     "single contact point": Feature(
@@ -232,7 +231,7 @@ JOINT_FEATURES = {
         lambda j: not (j.contact and j.contact.area), "", "a patch without [contact.area]"
     ),
     "shapes on different pieces": Feature(
-        lambda j: j.opposite_shape, "{opposite_shape}", "shapes on different pieces"
+        lambda j: j.opposite_shape, "{opposite_shape}", "a shape on each piece"
     ),
     "bands that slip together": Feature(lambda j: j.lacks("pieces", "shear")),
     "mode with yaw": Feature(lambda j: j.yaw, "{yaw}"),
@@ -303,7 +302,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
 def describe_row(names: str, instead: str) -> str:
     """Return the message of a row of UNSUPPORTED_COMBINATIONS, with names of properties of a `Joint` in braces.
 
-    `names` are the features of the row, and `instead` is what the user can do.
+    `names` are the features of the row, and `instead` is what the user can do, and why.
     """
     first, *others = names.split(", ")
     words = find_feature(first).words

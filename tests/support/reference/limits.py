@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-from patchfem.effects import LAWS, REMEDIES, join_words
+from patchfem.effects import LAWS, join_words
 from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_REPORTED_NORMAL_COUPLING_RATIO
 from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
 from patchfem.scene.rules import support
@@ -129,7 +129,6 @@ ELEMENT_LAWS = [
     name for name, law in LAWS.items() if {"pieces", "shear"} <= {*law.supports.split()}
 ]
 MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its keys.
-    "bench": "`[slide]`",
     "rig": "`[drive]` with `[friction]` or `[[structure.interface]]`",
     "load on a point": "`[normal]`",
     "single contact point": "in a rig: `[normal]`",
@@ -232,12 +231,11 @@ def find_refusals(columns: tuple) -> dict:
 def _format_combinations() -> str:
     """Return the table of the features that no run supports together."""
     rows = []
-    for names, instead in support.UNSUPPORTED_COMBINATIONS:
+    for names, advice in support.UNSUPPORTED_COMBINATIONS:
         features = [
             name if name in support.JOINT_FEATURES else f"`{name.replace('=', ' = ')}`"
             for name in names.split(", ")
         ]
-        advice = REMEDIES.get(instead, instead)
         for word, meaning in ADVICE.items():
             advice = advice.replace(word, meaning)
         rows.append((features[0], "; ".join(features[1:]), advice))
