@@ -514,7 +514,7 @@ def suggest_laws(feature: str, other_features: str = "", friction=None) -> str:
 
 def describe_unsupported(combination: str, remedy: str) -> str:
     """Return the message for a combination of effects that is not supported, with its remedy."""
-    if combination.startswith(("beside ", "with ", "in ")):
+    if combination.startswith("with "):
         return f"not supported yet {combination}; {remedy}"
     return f"{combination} is not supported yet; {remedy}"
 

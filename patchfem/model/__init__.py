@@ -10,6 +10,7 @@ PUBLIC = {
     "earlier_wear": (
         "GAP_DIFFERENCE_FRACTION",
         "LOADING_KEYS",
+        "interpolate_nodes",
     ),
     "files": ("find_file_faults",),
     "law": (

@@ -46,16 +46,16 @@ class EarlierWear:
     """State at the end of an earlier run with wear.
 
     - path: file of the results.
-    - x: positions (k,) [m] on the interface.
-    - depth: depth (k,) [m] worn off both pieces.
-    - gap: gap (k,) [m] between the unworn surfaces.
+    - axes: positions [m] of the nodes along the interface, (x,), or of the rows and columns of cells of a face, (y, x).
+    - depth: depth [m] worn off both pieces, over the axes.
+    - gap: gap [m] between the unworn surfaces, over the axes.
     - cycles: number of cycles until then.
     - scene: tables of the scene of that run.
     - measures: measures of that run by name, each with value and error.
     """
 
     path: Path
-    x: np.ndarray
+    axes: tuple[np.ndarray, ...]
     depth: np.ndarray
     gap: np.ndarray
     cycles: float
@@ -71,19 +71,20 @@ class EarlierWear:
             "run are counted from that state, but its worn_volume and worn_depth_max are measured from the unworn pieces"
         )
 
-    def depth_at(self, x) -> np.ndarray:
-        """Interpolate the worn depth (m,) [m] at positions x (m,) [m] on an interface of the same length."""
-        self._require_same_length(x)
-        return np.interp(x, self.x, self.depth)
+    def depth_at(self, axes) -> np.ndarray:
+        """Interpolate the worn depth to the nodes (m,) [m] of other axes on the same interface."""
+        self._require_same_length(axes)
+        return np.maximum(interpolate_nodes(self.axes, self.depth, axes), 0.0)
 
-    def require_same_surfaces(self, x, gap) -> None:
-        """Raise PatchfemError unless the unworn gap of the earlier run equals `gap` (m,) [m] at x (m,) [m].
+    def require_same_surfaces(self, axes, gap) -> None:
+        """Raise PatchfemError unless the unworn gap of the earlier run equals `gap` (m,) [m] at the nodes of other axes.
 
-        A straight line may be added to the gap, because the pieces may be tilted.
+        A plane may be added to the gap, because the pieces may be tilted.
         """
-        self._require_same_length(x)
-        change = np.interp(x, self.x, self.gap) - gap
-        change = float(np.abs(change - np.polyval(np.polyfit(x, change, 1), x)).max())
+        self._require_same_length(axes)
+        change = interpolate_nodes(self.axes, self.gap, axes) - gap
+        plane = np.column_stack([np.ones(gap.size), _list_places(axes)])
+        change = float(np.abs(change - plane @ np.linalg.lstsq(plane, change)[0]).max())
         if change > GAP_DIFFERENCE_FRACTION * float(np.ptp(gap)) + MIN_GAP_DIFFERENCE:
             raise PatchfemError(
                 f"{self.path}: the unworn surfaces of that run differ from those of this scene by "
@@ -103,15 +104,43 @@ class EarlierWear:
             return None
         return measure["error"] + abs(measure["value"] - value)
 
-    def _require_same_length(self, x) -> None:
-        """Raise PatchfemError unless the interface of the earlier run is as long as x (m,) [m]."""
-        ends = (x[0], x[-1])
-        if not np.allclose(self.x[[0, -1]], ends, rtol=MAX_LENGTH_DIFFERENCE, atol=0):
-            raise PatchfemError(
-                f"{self.path}: the interface of that run is {format_length(float(np.ptp(self.x)))} long, but "
-                f"that of this scene {format_length(x[-1] - x[0])}; choose a run of the same pieces",
-                WEAR_START_KEY,
-            )
+    def _require_same_length(self, axes) -> None:
+        """Raise PatchfemError unless the interface of the earlier run is as long as that of other axes [m]."""
+        before = self.axes[0]
+        x = axes[0]
+        # The keys tell the size of a face, whose cells have their places in the middle.
+        if len(axes) > 1 or np.allclose(before[[0, -1]], x[[0, -1]], MAX_LENGTH_DIFFERENCE, 0):
+            return
+        raise PatchfemError(
+            f"{self.path}: the interface of that run is {format_length(float(np.ptp(before)))} long, but "
+            f"that of this scene {format_length(x[-1] - x[0])}; choose a run of the same pieces",
+            WEAR_START_KEY,
+        )
+
+
+def interpolate_nodes(axes, values, others) -> np.ndarray:
+    """Interpolate values at the nodes of axes linearly to the nodes (m,) of other axes.
+
+    Parameters
+    ----------
+    axes, others : tuple of (k,) array
+        Positions [m] of nodes, (x,), or of the rows and columns of cells of a face, (y, x).
+    values : array
+        Values at all nodes, in any unit.
+    """
+    if len(axes) == 1:
+        return np.interp(others[0], axes[0], values)
+    from scipy.interpolate import RegularGridInterpolator
+
+    # The outer cells of a finer grid lie beyond those of a coarser one.
+    values = values.reshape([axis.size for axis in axes])
+    field = RegularGridInterpolator(axes, values, bounds_error=False, fill_value=None)
+    return field(_list_places(others))
+
+
+def _list_places(axes) -> np.ndarray:
+    """Return the places (m, d) [m] of the nodes of d axes, row by row."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
 def read_end_state(path: Path) -> EarlierWear:
@@ -129,24 +158,24 @@ def read_end_state(path: Path) -> EarlierWear:
     Raises
     ------
     PatchfemError
-        If the file is not that of a run with [wear] over a plane patch.
+        If the file is not that of a run with [wear] of a patch.
     """
     import h5py
 
-    # Depth and gap are per node of the earlier mesh. The gap in the file is that of the worn pieces.
+    # Depth and gap are per node or cell of the earlier mesh. The gap in the file is that of the worn pieces.
     try:
         with h5py.File(path, "r") as file:
             depth = np.array(file["worn_depth"][-1], float)
             earlier = EarlierWear(
                 path=path,
-                x=np.array(file["x"], float),
+                axes=tuple(np.array(file[name], float) for name in "yx"[-depth.ndim :]),
                 depth=depth,
                 gap=np.array(file["unloaded_gap"], float) - depth,
                 cycles=float(np.array(file["wear_cycle"], float)[-1]),
                 scene=tomllib.loads(file.attrs["scene"]),
                 measures=json.loads(file.attrs["measures"]),
             )
-        is_usable = _has_depth_along_patch(earlier) and "cycles" in earlier.scene["wear"]
+        is_usable = _has_depth_over_axes(earlier) and "cycles" in earlier.scene["wear"]
     except FOREIGN_ERRORS:
         raise PatchfemError(
             f"{path}: not the result.nc of a run with [wear] and [contact]; give such a file",
@@ -156,23 +185,24 @@ def read_end_state(path: Path) -> EarlierWear:
     # What the file has but this run cannot use.
     if not is_usable:
         raise PatchfemError(
-            f"{path}: the worn depth in this file is not a list of depths along a patch; run that "
-            "scene again",
+            f"{path}: the worn depth in this file does not fit the nodes of a patch; run that scene again",
             WEAR_START_KEY,
         )
     return earlier
 
 
-def _has_depth_along_patch(earlier: EarlierWear) -> bool:
-    """Return whether position, depth and gap of an earlier run are finite and fit together.
+def _has_depth_over_axes(earlier: EarlierWear) -> bool:
+    """Return whether positions, depth and gap of an earlier run are finite and fit together.
 
-    Each must be a list with one number per node, in which positions increase and no depth is negative.
+    Depth and gap must have one number per node, in which positions increase and no depth is negative.
     """
-    x = earlier.x
-    for column in (x, earlier.depth, earlier.gap):
-        if column.ndim != 1 or column.shape != x.shape or not np.isfinite(column).all():
+    shape = tuple(axis.size for axis in earlier.axes)
+    for values in (earlier.depth, earlier.gap):
+        if values.shape != shape or not np.isfinite(values).all():
             return False
-    return bool(x.size > 1 and (np.diff(x) > 0).all() and earlier.depth.min() >= 0)
+    if min(shape) < 2 or earlier.depth.min() < 0:
+        return False
+    return all((np.diff(axis) > 0).all() for axis in earlier.axes)
 
 
 def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
@@ -204,4 +234,6 @@ def _describe_pieces(scene: dict[str, dict[str, Any]]) -> dict[str, Any]:
         for key, value in scene["contact"].items()
         if key not in LOADING_KEYS and key not in SURFACE_KEYS
     }
+    if "contact.area" in pieces:
+        pieces["contact.area"] = pieces["contact.area"] | {"cells": None}
     return pieces | {"wear.upper_share": scene["wear"]["upper_share"]}

@@ -65,9 +65,9 @@ class WearModel:
     friction: WornFriction | None = None
     start: earlier_wear.EarlierWear | None = None
 
-    def compute_earlier_depth(self, x, area) -> np.ndarray:
-        """Return the depth [m] worn before the first cycle at x (m,) [m], distributed like `area`."""
-        return np.zeros(np.shape(area)) if self.start is None else self.start.depth_at(x)
+    def compute_earlier_depth(self, axes, area) -> np.ndarray:
+        """Return the depth [m] worn before the first cycle at the nodes of axes, distributed like `area`."""
+        return np.zeros(np.shape(area)) if self.start is None else self.start.depth_at(axes)
 
 
 def build_wear_model(scene: Scene) -> WearModel:

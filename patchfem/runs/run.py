@@ -470,7 +470,7 @@ def hash_run(model, patch, version: str) -> str:
     if patch is not None:
         arrays += [patch.x, patch.unloaded_gap]
     if model.wear is not None and model.wear.start is not None:
-        arrays += [model.wear.start.x, model.wear.start.depth]
+        arrays += [*model.wear.start.axes, model.wear.start.depth]
     if model.slide is not None and model.slide.corners is not None:
         arrays += model.slide.corners
     digest = hashlib.sha256(f"{version}\n{model.source.resolved}".encode())

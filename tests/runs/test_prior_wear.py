@@ -95,3 +95,46 @@ def test_refuses_wear_of_other_profile_or_worn_through_coating(earlier_run_folde
     )
     with pytest.raises(pf.PatchfemError, match="the coating of the upper piece was worn through;"):
         pf.run(loads(coated, earlier_run_folder / "a.toml", ["wear.start=gone/result.nc"]))
+
+
+FACE = """\
+[contact]
+length = "10 mm"
+width = "6 mm"
+height = "5 mm"
+load = "100 N"
+substrate = "steel"
+[contact.area]
+cells = 32
+[contact.crown]
+radius = "5 m"
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "50 um"
+frequency = "20 Hz"
+cycles = 2
+[wear]
+coefficient = "1e-14 m^2/N"
+cycles = 1000
+"""
+
+
+@pytest.mark.parametrize("cells", [32, 48])
+def test_worn_face_continues_on_its_own_and_on_other_cells(tmp_path, cells):
+    """Two halves of the wear of a face agree with the whole run, and with Archard's volume k N s, within their errors."""
+    pf.run(loads(FACE, tmp_path / "a.toml")).save(tmp_path / "one")
+    sets = "wear.start=one/result.nc", f"contact.area.cells={cells}"
+    found = pf.run(loads(FACE, tmp_path / "a.toml", sets)).measures
+    whole = pf.run(loads(FACE, tmp_path / "a.toml", ["wear.cycles=2000"])).measures[
+        "worn_depth_max"
+    ]
+    volume = found["worn_volume"]
+    assert abs(volume.value - 1e-14 * 100 * 4 * 50e-6 * 2000) <= volume.error < 0.1 * volume.value
+    depth = found["worn_depth_max"]
+    assert abs(depth.value - whole.value) <= depth.error < 0.2 * depth.value
+    message = "are not those of this scene .contact.width differ"
+    with pytest.raises(pf.PatchfemError, match=message):
+        pf.run(loads(FACE, tmp_path / "a.toml", [*sets, "contact.width=5 mm"]))

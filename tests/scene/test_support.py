@@ -5,15 +5,13 @@ from __future__ import annotations
 import re
 
 import pytest
-from scene_texts import BENCH, FORCED, LINEAR, PAIR, PATCH, RIG
+from scene_texts import BENCH, FORCED, LINEAR, PAIR, RIG
 
 from patchfem.scene import loads
 from patchfem.scene.rules import support
 from patchfem.scene.scene import SceneError
 
 POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
-PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
-IWAN = "{law}.law=iwan {law}.stiffness=1e7_N/m {law}.chi=-0.5 {law}.beta=0.5"
 BONDS = "{law}.law=nonlocal {law}.bond_length=1_um"
 INTERLOCKING = "structure.bonded.stiffness=1e5_N/m structure.bonded.wavelength=80_um"
 EXPONENTIAL = "{patch}.asperities.law=exponential {patch}.asperities.decay_length=1_um"
@@ -26,8 +24,6 @@ OWN_PATCH = "{patch}.length=10_mm {patch}.width=10_mm {patch}.height=5_mm {patch
 WEAR = "wear.coefficient=1e-14_m^2/N wear.cycles=1000"
 # Assignments that give a scene a feature, separated by blanks; _ stands for the blank in a quantity.
 SETS = {
-    "accuracy.quadrature=recursion": "accuracy.quadrature=recursion",
-    "accuracy.quadrature=merged": f"{BONDS} {{law}}.reading=report accuracy.quadrature=merged",
     "bonds that no force can move": f"{BONDS} {{law}}.reading=report {{law}}.order=-0.5",
     "bonds of a given stiffness": "{law}.law=elastic-plastic {law}.stiffness=1e7_N/m",
     "changing load": "{change}",
@@ -35,33 +31,18 @@ SETS = {
     "grooves": GROOVES,
     "interface": "",
     "kinetic below static": "{law}.law=coulomb {law}.kinetic=0.2",
-    "law for a constant load": IWAN,
-    "law for flat faces": IWAN,
-    "law for rigid pieces": IWAN,
-    "law without parallel elements": IWAN,
-    "law of an averaged pressure": "{law}.law=convolution {law}.bond_length=1_um",
-    "law that sticks rigidly": "{law}.law=coulomb",
     "memory of the slip": BONDS,
-    "law with memory for a constant pressure": IWAN,
-    "law with memory but without bonds": "{law}.law=elastic-plastic",
-    "law without bonds": "{law}.law=coulomb",
     "load on a point": "",
     "joint without a single stiffness": "{change}",
     "nonlinear asperities": EXPONENTIAL,
     "output that bounds the motion": "structure.travel=1_mm",
     "mode with heave or pitch": "structure.mode.second.pitch=1_rad/m",
     "mode with yaw": "structure.mode.second.yaw=1_rad/m",
-    "named method of the sum": f"{BONDS} accuracy.quadrature=direct",
-    "no friction": "{law}.static=0",
-    "normal.grooves": GROOVES,
     "normal.amplitude": "normal.amplitude=5_N normal.frequency=50_Hz",
     "partial slip": "{patch}.shear={{}}",
-    "patch of an interface": OWN_PATCH,
     "patch.approach": "{patch}.approach.distance=1_um",
     "patch.grooves": "{patch}.grooves.wavelength=80_um {patch}.grooves.amplitude=1_um",
-    "patch.holder.tangential_stiffness": "{patch}.holder.tangential_stiffness=1e7_N/m",
     "patch.area": "{patch}.area.cells=64",
-    "patches of interfaces": OWN_PATCH,
     "sensor apart from the output": "structure.mode.second.gauge=0.3",
     "shape on the lower piece": (
         "{patch}.tilt.angle=0.1_mrad {patch}.tilt.on=lower"
@@ -70,22 +51,13 @@ SETS = {
         "{patch}.tilt.angle=0.1_mrad {patch}.crown.radius=1_m {patch}.crown.on=lower"
     ),
     "single contact point": "",
-    "spread of the bonds": f"{BONDS} {{law}}.spread=1_um",
-    "structure.bonded.wavelength": INTERLOCKING,
     "structure.measured=stuck": "structure.measured=stuck",
-    "structure.stiffening": "structure.stiffening.cubic=1e10_N/m^3",
-    "sum by recursion": "",
-    "sum over all bonds": f"{BONDS} {{law}}.order=2",
-    "sum over all stretched bonds": f"{BONDS} {{law}}.order=2",
     "wear": WEAR,
-    "wear.start": "wear.start=result.nc",
 }  # fmt: skip
 # Property of a joint in a message, after re.escape
 PROPERTY = re.compile(r"\\\{.*?\}")
 # More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
 MORE_SETS = {
-    "law for rigid pieces, partial slip, grooves": "{law}.law=tanh {law}.reference_speed=1_mm/s",
-    "structure.measured=stuck, mode with yaw": "{patch}.area.cells=64",
     "mode with yaw, bands that slip together, partial slip": f"{BONDS} {{patch}}.area.cells=64",
     "wear, mode with yaw, partial slip": "{law}.law=coulomb {patch}.area.cells=64",
 }
@@ -93,8 +65,8 @@ REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
     '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\nboundary = [1, 2]\nslide = [1, 0]\n'
     + LINEAR[LINEAR.index("[drive]") :]
 )
-POINT_FEATURES = {"load on a point", "single contact point", "normal.amplitude", "normal.grooves"}
-MASS_FEATURES = {"interface", "several interfaces", "structure.interface"}
+POINT_FEATURES = {"load on a point", "single contact point", "normal.amplitude"}
+MASS_FEATURES = {"interface", "structure.interface"}
 
 
 FILE = """\
@@ -117,9 +89,7 @@ def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
     """Return a scene for some features, and the keys of its law, its load, its patch and a changing load."""
     words = {"law": "friction", "load": "contact", "patch": "contact"}
     words["change"] = SETS["mode with heave or pitch"]
-    if features == {"shape on the lower piece", "law without bonds", "partial slip"}:
-        return PATCH_BENCH, words
-    if features & (MASS_FEATURES | {"patch of an interface"}):
+    if features & MASS_FEATURES:
         law = "structure.interface.0"
         return PAIR + FORCED, words | {"law": law, "patch": f"{law}.contact"}
     if features & POINT_FEATURES:

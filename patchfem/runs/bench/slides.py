@@ -137,9 +137,10 @@ def _follow_without_memory(task: SlideTask) -> SlideHistories:
     if grooves is None:
         force, losses = _slide_on_flat_surfaces(task, load)
     else:
-        force, losses = _climb_grooves(task, load)
-        rises = _average_steps(load) * grooves.height_difference(slide[:-1], slide[1:])
-        stored = load[0] * grooves.height(slide[0]) + np.append(0.0, np.cumsum(rises))
+        mean_load = 0.5 * (load[:-1] + load[1:])
+        force, losses = _climb_grooves(task, load, mean_load)
+        rises = mean_load * grooves.height_difference(slide[:-1], slide[1:])
+        stored = np.cumsum([load[0] * grooves.height(slide[0]), *rises])
 
     # A force at the end of a rest is that of the motion that begins there.
     static = model.friction.static
@@ -239,17 +240,16 @@ def find_rest_ends(model, slide) -> dict[int, float]:
     return {int(k): float(moves[k]) for k in ends}
 
 
-def _climb_grooves(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
+def _climb_grooves(task: SlideTask, load, mean_load) -> tuple[np.ndarray, np.ndarray]:
     """Return the force (k,) [N] and the friction loss of each step (k - 1,) [J] on the flanks of grooves, without inertia.
 
     The force is N (t + phi)/(1 - phi t) under the load N (k,), with the slope t and the friction ratio phi = f/R along
-    the flank.
+    the flank. The loss of a step is that under its mean load (k - 1,) [N].
     """
     slide = task.slide
     grooves = task.model.grooves
     friction = task.model.friction
     moves = np.diff(slide)
-    mean_load = _average_steps(load)
     if law_has_trait(friction.law, "set-valued"):
         back, forward = (_find_limits(task, load, sign) / load for sign in (-1.0, 1.0))
         # Index of the last step in which the interface moved, up to each step; -1 before the first one.
@@ -278,11 +278,6 @@ def _climb_grooves(task: SlideTask, load) -> tuple[np.ndarray, np.ndarray]:
 
     t, phi = find_flank(slide, np.append(0.0, speed))
     return load * (t + phi) / (1 - phi * t), integrate_steps(slide, find_loss)
-
-
-def _average_steps(values) -> np.ndarray:
-    """Return the means (k - 1,) of values (k,) over the steps."""
-    return 0.5 * (values[:-1] + values[1:])
 
 
 def integrate_steps(slide, integrand) -> np.ndarray:

@@ -434,30 +434,6 @@ def make_force_function(patch: AreaPatch):
     return compute_forces
 
 
-def transfer_to_grid(values: np.ndarray, patch: AreaPatch, other: AreaPatch) -> np.ndarray:
-    """Interpolate values at the cells of a face linearly to those of another grid.
-
-    Parameters
-    ----------
-    values : (m,) ndarray
-        Values at the cells of the face, in any unit.
-    patch : AreaPatch
-        Face with these m cells.
-    other : AreaPatch
-        Face with k cells on the same pieces.
-
-    Returns
-    -------
-    (k,) ndarray
-        Values at the cells of the other face.
-    """
-    rows = values.reshape(patch.shape)
-    fine = patch.pieces.normal
-    coarse = other.pieces.normal
-    along_x = np.array([np.interp(coarse.x, fine.x, row) for row in rows])
-    return np.array([np.interp(coarse.y, fine.y, column) for column in along_x.T]).T.ravel()
-
-
 def _find_start(pressure: np.ndarray, shape: tuple[int, int]) -> np.ndarray | None:
     """Return a pressure on as many cells, or on cells half as long, from which the solver starts; None on others."""
     factor = shape[0] // len(pressure)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
+from ...model.earlier_wear import interpolate_nodes
 from ...model.patch import PatchPiece
 from ...time_steps.checkpoint import RETRY_ADVICE, read_state, write_state
 from ...wear.depth import wear_rates
@@ -208,7 +209,7 @@ def compute_wear(
     try:
         if initial is None:
             patch = _add_earlier_wear(model, patch)
-            earlier_depth = model.wear.compute_earlier_depth(patch.x, problem.area)
+            earlier_depth = model.wear.compute_earlier_depth(_list_axes(patch), problem.area)
             state = make_initial_wear_state(problem, earlier_depth)
             moments = (_record_moment(patch, state, motion),)
         else:
@@ -238,7 +239,7 @@ def compute_wear(
     replayed = []
     for mesh in coarse:
         if mesh is not None:
-            replayed.append(_replay_wear(patch_model, model, patch, mesh, moments))
+            replayed.append(_replay_wear(model, patch, mesh, moments))
 
     worn = (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None))
     add_measures = with_static_measures if patch_model.area is None else area.with_face_measures
@@ -384,6 +385,12 @@ def find_cycle_of_next_table_row(wear, problem: WearProblem, state: WearState) -
     return state.cycle + (rows[is_near] - depth) / rate
 
 
+def _list_axes(patch) -> tuple[np.ndarray, ...]:
+    """Return the positions [m] of the nodes of a patch, (x,), or of the rows and columns of cells of a face, (y, x)."""
+    cells = patch.pieces.normal
+    return (patch.x,) if patch.model.area is None else (cells.y, cells.x)
+
+
 def _add_earlier_wear(model, patch):
     """Return the patch with the worn depth of an earlier run added to its gap.
 
@@ -397,9 +404,9 @@ def _add_earlier_wear(model, patch):
     earlier_run = model.wear.start
     if earlier_run is None:
         return patch
-    earlier_run.require_same_surfaces(patch.x, patch.unloaded_gap)
-    areas = patch.pieces.interface.weight
-    depth = frozen_array(model.wear.compute_earlier_depth(patch.x, areas))
+    axes = _list_axes(patch)
+    earlier_run.require_same_surfaces(axes, patch.unloaded_gap)
+    depth = frozen_array(earlier_run.depth_at(axes))
     if (coating := find_worn_through_coating(model, depth)) is not None:
         raise PatchfemError(
             f"{earlier_run.path}: in that run the coating of the {coating.piece} piece was worn through; choose a "
@@ -478,15 +485,13 @@ def compute_worn_volume_and_depth(patch_model, patch, depth) -> Values:
     }
 
 
-def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch, np.ndarray]:
+def _replay_wear(model, patch, other_patch, moments) -> tuple[Patch, np.ndarray]:
     """Repeat the jumps of a run on another mesh.
 
     The slip paths are interpolated. Returns the worn patch and its worn depth [m].
 
     Parameters
     ----------
-    patch_model : PatchModel
-        Model of the other patch.
     model : Model
         Model of the run.
     patch, other_patch : Patch
@@ -495,23 +500,20 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple[Patch
         States after each jump of the run.
     """
     areas = other_patch.pieces.interface.weight
-
-    def interpolate_path(path) -> np.ndarray:
-        """Interpolate a slip path to the nodes or cells of the other patch."""
-        if patch_model.area is not None:
-            return area.transfer_to_grid(path, patch, other_patch)
-        return np.interp(other_patch.x, patch.x, path)
+    axes = _list_axes(patch)
+    others = _list_axes(other_patch)
 
     # Cycles of each jump, and the slip path with which the run wore the patch
     jumps = []
     for before, after in pairwise(moments):
-        jumps.append((after.cycle - before.cycle, interpolate_path(after.used)))
+        path = interpolate_nodes(axes, after.used, others)
+        jumps.append((after.cycle - before.cycle, path))
     depth = replay_jumps(
         _make_force_function(other_patch),
         areas,
         model.wear.coefficient,
         jumps,
-        model.wear.compute_earlier_depth(other_patch.x, areas),
+        model.wear.compute_earlier_depth(others, areas),
     )
     return solve_worn(other_patch, frozen_array(depth)), depth
 

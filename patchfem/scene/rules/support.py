@@ -103,14 +103,6 @@ class Joint(TableFacts):
         """
         return law_has_trait(self.law or None, trait)
 
-    def supports(self, *words: str) -> bool:
-        """Return whether the law is known and supports all of some features, such as "pieces" (spring-slider elements)."""
-        return self.law in LAWS and all(law_supports(self.table, word) for word in words)
-
-    def lacks(self, *words: str) -> bool:
-        """Return whether the law is known and does not support all of some features, such as "pieces"."""
-        return self.law in LAWS and not self.supports(*words)
-
     @cached_property
     def lower_shape(self) -> str:
         """Key of the first shape on the lower piece; "" if there is none, or if shapes lie on both pieces."""
@@ -233,19 +225,16 @@ JOINT_FEATURES = {
     "shapes on different pieces": Feature(
         lambda j: j.opposite_shape, "{opposite_shape}", "a shape on each piece"
     ),
-    "bands that slip together": Feature(lambda j: j.lacks("pieces", "shear")),
+    "bands that slip together": Feature(
+        lambda j: (
+            j.law in LAWS
+            and not (law_supports(j.table, "pieces") and law_supports(j.table, "shear"))
+        )
+    ),
     "mode with yaw": Feature(lambda j: j.yaw, "{yaw}"),
     "grooves": Feature(lambda j: not j.is_interface and j.grooves, "contact.grooves", "{grooves}"),
     # interfaces
     "interface": Feature(lambda j: j.is_interface, "{table_key}", "[[structure.interface]]"),
-    "several interfaces": Feature(
-        lambda j: j.is_interface and len(j.scene.structure.interface) > 1,
-        "structure.interface",
-        "other interfaces",
-    ),
-    "patch of an interface": Feature(
-        lambda j: j.is_interface and j.contact, "{patch_key}", "[structure.interface.contact]"
-    ),
 }
 
 

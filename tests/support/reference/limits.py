@@ -154,8 +154,6 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "bands that slip together": "another law than " + join_words(ELEMENT_LAWS, "or"),
     "grooves": "`[contact.grooves]` or `[normal.grooves]`, with `amplitude` > 0",
     "interface": "`[[structure.interface]]`",
-    "several interfaces": "at least two `[[structure.interface]]`",
-    "patch of an interface": "`[structure.interface.contact]`",
 }  # fmt: skip
 METHOD_COLUMNS = tuple(
     SceneColumn(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS
