@@ -84,16 +84,16 @@ def try_step(system, level, row, begin, end, drive):
 
     # An event inside the step, or Newton's method without a solution, halves the step.
     write_trial(system, level)
-    is_shortest = level == system.structure.responses.shape[0] - 1
+    is_last = steps.is_shortest(system, level)
     if system.options.has_events:
         last = drive[0] + dt * (drive[1] + 0.5 * dt * drive[2])
         if steps.find_event(system, level, last):
             return False
-    if not is_shortest and steps.gains_energy(system):
+    if not is_last and steps.gains_energy(system):
         return False
     if not is_solved:
         # After a shortest step without a solution the march has no result, and shorter steps would only take time.
-        if not is_shortest and system.totals[Total.UNSOLVED] == 0:
+        if not is_last and system.totals[Total.UNSOLVED] == 0:
             return False
         system.totals[Total.UNSOLVED] += 1
 

@@ -14,11 +14,14 @@ force of a list of bonds jumps as bonds change their sign, so that there may be 
 balance by their path means, F = sum of means and kappa (b + db/2) = shapes^T mean, where the derivatives of a potential
 vanish.
 
-Newton's method has the Jacobian in the space of ports and coordinates. With lists, a line search finds the minimum. A step
-that it does not solve is halved. Loads that follow from the motion (normal contact under heave and pitch, flanks of grooves,
-pressure of the lower piece) are iterated with it. Where a step does not resolve the decay of the velocity of a port by the
-viscosity V of its points, x = G V > 1, the weight 1 - 1/x goes to the end of the step, in the force and in the increment of
-the points. A vibration on stiff points that the step does not resolve stays undamped, so that comparisons with fewer steps
+Newton's method has the Jacobian in the space of ports and coordinates. With lists, and in steps of the last level, a
+line search finds the minimum. A step that it does not solve is halved. Loads that follow from the motion (normal
+contact under heave and pitch, flanks of grooves, pressure of the lower piece) are iterated with it. On soft pieces the
+friction may fall with the slide over the lower piece more steeply than they relax; then there is no equilibrium next to
+the last one, and the pieces snap. Steps of the last level take the pressure at their start, so that they always have a
+solution and follow the snap. Where a step does not resolve the decay of the velocity of a port by the viscosity V of
+its points, x = G V > 1, the weight 1 - 1/x goes to the end of the step, in the force and in the increment of the
+points. A vibration on stiff points that the step does not resolve stays undamped, so that comparisons with fewer steps
 show its error.
 
 A rigid point (`Law.COULOMB`), the only one on its port, slips under a given force, or its port is held at rest. A step in
@@ -273,7 +276,8 @@ def write_forces(system, level, step):
     flank = system.flank
     place_points(system, level, step)
     change = 0.0
-    if system.ports.contact[0] >= 0 or flank.size or points.pressure.size:
+    has_places = points.pressure.size and not is_shortest(system, level)
+    if system.ports.contact[0] >= 0 or flank.size or has_places:
         change = find_loads(system, 0, 0.0, True)
         if change < 0:
             return change
@@ -582,6 +586,7 @@ def solve_forces(system, level, step):
     smallest = residual
     n_stalls = 0
     has_lists = system.options.has_lists > 0
+    has_potential = has_lists or (is_shortest(system, level) and not system.options.has_events)
     stalled = LISTS_STALLED if has_lists else STALLED
     for _ in range(MAX_NEWTON_ITERATIONS):
         if residual <= 1.0 or (n_stalls >= MAX_STALLS and residual <= stalled):
@@ -590,18 +595,18 @@ def solve_forces(system, level, step):
         if not find_newton_step(system, level, step):
             return False
         descent = -find_slope(system, level)
-        if has_lists and descent < 0:
+        if has_potential and descent < 0:
             drop_negative_slopes(system)
             if not find_newton_step(system, level, step):
                 return False
             descent = -find_slope(system, level)
         store_base(system)
 
-        # The line search accepts a step that decreases the largest residual, and with lists one near the minimum of the
-        # potential, because forces of lists bend at many places.
+        # The line search accepts a step that decreases the largest residual, or one near the minimum of the potential of
+        # forces that bend at many places.
         fraction = 1.0
         before = residual
-        for _ in range(LIST_CUTS if has_lists else MAX_CUTS):
+        for _ in range(LIST_CUTS if has_potential else MAX_CUTS):
             subtract_step(system, fraction)
             change = write_balanced_forces(system, level, step)
             if change < 0:
@@ -609,7 +614,7 @@ def solve_forces(system, level, step):
             residual = max(write_residual(system, level), change / LOAD_RESIDUAL)
             if residual <= 1.0:
                 break
-            if has_lists:
+            if has_potential:
                 slope = find_slope(system, level)
                 if descent <= 0 or slope <= MAX_OVERSHOOT * descent:
                     break
@@ -735,6 +740,12 @@ def is_held(points, p):
 
 
 @njit(**NJIT_CALL)
+def is_shortest(system, level):
+    """Return whether a step of this level cannot be halved."""
+    return level == system.structure.responses.shape[0] - 1
+
+
+@njit(**NJIT_CALL)
 def find_event(system, level, drive):
     """Return whether a rigid point stops or is released, or gains energy, within the trial step.
 
@@ -752,7 +763,7 @@ def find_event(system, level, drive):
     points = system.points
     moves = system.ports.values
     duration = system.options.step / (1 << level)
-    is_shortest = level == system.structure.responses.shape[0] - 1
+    is_last = is_shortest(system, level)
     is_found = False
     is_any_held = False
     for block in range(points.law.size):
@@ -768,7 +779,7 @@ def find_event(system, level, drive):
         round_off = RESIDUAL * abs(moves[Port.SLIDE, p])
         is_reversed = direction * moves[Port.INCREMENT, p] < -creep * duration - round_off
         is_found = is_found or is_reversed or direction * moves[Port.END_VELOCITY, p] < -creep
-    if is_found and not is_shortest:
+    if is_found and not is_last:
         return True
 
     # Ports that creep stop with the port that has reversed, because one motion of the modes may move both.
@@ -776,7 +787,7 @@ def find_event(system, level, drive):
         speed = points.memory[block, 0] * moves[Port.END_VELOCITY, points.port[block]]
         if points.law[block] == Law.COULOMB and speed < find_creep(system, block):
             points.trial[block, 0] = 0.0
-    return is_any_held and release_port(system, drive, is_shortest)
+    return is_any_held and release_port(system, drive, is_last)
 
 
 @njit(**NJIT_CALL)
@@ -810,7 +821,7 @@ def find_creep(system, block):
 
 
 @njit(**NJIT_CALL)
-def release_port(system, drive, is_shortest):
+def release_port(system, drive, is_last):
     """Return whether a port at rest is released in the trial step, which can then be halved; the shortest step releases it.
 
     Of the ports whose holding force exceeds its limit, that with the largest ratio is released.
@@ -821,7 +832,7 @@ def release_port(system, drive, is_shortest):
         Arrays of the march, changed in place.
     drive : float
         Drive at the end of the step [m s-2].
-    is_shortest : bool
+    is_last : bool
         Whether the step cannot be halved.
     """
     points = system.points
@@ -844,9 +855,9 @@ def release_port(system, drive, is_shortest):
             largest = hold / limit if limit > 0 else np.inf
     if worst < 0:
         return False
-    if is_shortest:
+    if is_last:
         points.trial[points.first[worst], 0] = np.sign(ports.values[Port.HOLD, worst])
-    return not is_shortest
+    return not is_last
 
 
 @njit(**NJIT_CALL)
@@ -991,7 +1002,13 @@ def solve_step(system, level, row, end):
     for p in range(moves.shape[1]):
         force = 3 * (moves[Port.LAST, p] - moves[Port.EARLIER, p]) + moves[Port.FIRST, p]
         moves[Port.FORCE, p] = force
-    if system.options.has_loads and system.structure.loads.size:
+    if points.pressure.size and is_shortest(system, level):
+        # The pressure at the places where the step begins
+        for block in range(points.law.size):
+            for j in range(points.count[block]):
+                points.values[block, Value.SLIDE + j] = 0.0
+        find_loads(system, row, end, False)
+    elif system.options.has_loads and system.structure.loads.size:
         find_loads(system, row, end, False)
     return solve_forces(system, level, step)
 

@@ -95,8 +95,8 @@ stiffness = "1e6 N/m"
 CARVED = '[{}.grooves]\nwavelength = "40 um"\namplitude = "{}"\n'
 OSCILLATING = 'amplitude = "{}"\nfrequency = "143 Hz"\nphase = "1 rad"\n'
 SHEAR = "[contact.shear]\n"
-# Pieces ten thousand times as stiff as steel, with the same gap relative to the approach
-STIFF = PATCH.format("2e6 GPa", "1e5 m")
+# Pieces a million times as stiff as steel, with the same gap relative to the approach
+STIFF = PATCH.format("2e8 GPa", "1e7 m")
 WORN = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'
 
 
