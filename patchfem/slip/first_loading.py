@@ -98,16 +98,12 @@ class LevelForces:
 class CellElements:
     """Parallel elements of a face whose cells yield at their friction limits, with the names of a `JenkinsSet`.
 
-    - compliance: Shear compliance of the cells.
-    - pressure_limit (ny, nx): Friction limits [Pa].
     - points, limit (a,): Cells in contact, and their friction limits [N].
     - loading: First loading of these cells.
     - stiffness, yield_displacement (t,): [N/m] and [m].
     - force_matrix: Forces of the cells in contact per stretch of the elements.
     """
 
-    compliance: CellCompliance
-    pressure_limit: np.ndarray
     points: np.ndarray
     limit: np.ndarray
     loading: FirstLoading
@@ -267,7 +263,7 @@ def make_cell_elements(compliance: CellCompliance, limit: np.ndarray) -> CellEle
     points = np.flatnonzero(limit > 0)
     force_limit = limit.ravel()[points] * compliance.cell_area
     forces = LevelForces(loading, sliders)
-    return CellElements(compliance, limit, points, force_limit, loading, *sliders, forces)
+    return CellElements(points, force_limit, loading, *sliders, forces)
 
 
 def list_band_sliders(
@@ -295,13 +291,13 @@ def list_band_sliders(
     return out
 
 
-def find_reversal(elements: CellElements, amplitude: float) -> ReversalState:
+def find_reversal(compliance: CellCompliance, limit: np.ndarray, amplitude: float) -> ReversalState:
     """Find the state of a face at the reversal of steady cycles with a displacement amplitude [m].
 
-    In a steady cycle each stroke slips twice as far as the first loading to the amplitude (Masing).
+    In a steady cycle each stroke slips twice as far as the first loading to the amplitude (Masing). The compliance and the
+    friction limits [Pa] are those of `find_first_loading`.
     """
-    limit = elements.pressure_limit
-    solution = slip_from_rest(elements.compliance, limit, amplitude)
+    solution = slip_from_rest(compliance, limit, amplitude)
     is_closed = limit > 0
     slips = is_closed & (np.abs(solution.traction) >= limit)
     slip = np.where(slips, np.maximum(-solution.slope, 0.0), 0.0)

@@ -326,6 +326,6 @@ def test_exact_cattaneo_mindlin(poisson, radius=0.01, friction=0.3, n_cells=128)
     force = load * (1 - 0.5**1.5)
     work = load * (amplitude - 0.4 * gross * (1 - 0.5**2.5))
     assert loop == pytest.approx(8 * (work - force * amplitude / 2), rel=1e-3)
-    status = find_reversal(elements, amplitude).status
+    status = find_reversal(shear, limit, amplitude).status
     stick = np.sqrt((status == STICK).sum() * cells.cell_area / np.pi)
     assert stick == pytest.approx(half * (1 - force / load) ** (1 / 3), rel=0.015)

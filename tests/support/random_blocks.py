@@ -133,12 +133,13 @@ def compute_errors(seed: int, folder: Path) -> dict[str, tuple[float, float, flo
 
     # The loop of parallel elements between two reversals, by Masing's rule
     limit = FRICTION * reference.pressed.pressure
-    elements = make_cell_elements(reference.slip_compliance, limit)
+    compliance = reference.slip_compliance
+    elements = make_cell_elements(compliance, limit)
     stiffness, yields = elements.stiffness, elements.yield_displacement
     amplitude = model.slide.amplitude
     values["friction_force_peak"] = stiffness @ np.minimum(amplitude, yields)
     values["loop_area"] = 4 * stiffness @ (yields * np.maximum(amplitude - yields, 0.0))
-    values["stick_area_fraction"] = find_reversal(elements, amplitude).stick_fraction
+    values["stick_area_fraction"] = find_reversal(compliance, limit, amplitude).stick_fraction
     return {
         name: (measure.value, abs(measure.value - values[name]), measure.error)
         for name, measure in result.measures.items()
