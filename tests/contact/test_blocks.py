@@ -263,12 +263,28 @@ def test_exact_first_loading_is_concave_and_ends_at_the_limit():
     """9: The curve begins with the stiffness of the set, is concave, and ends at the friction limit."""
     shear, limit = get_slipping_cells()
     elements = get_elements()
-    displacement, force = elements.loading
+    displacement, force, _ = elements.loading
     slopes = np.diff(force.sum(axis=1)) / np.diff(displacement)
     assert force[-1].sum() == pytest.approx(0.3 * LOAD, rel=1e-9)
     stiffness = compute_contact_stiffness(shear, limit > 0)
     assert elements.stiffness.sum() == pytest.approx(stiffness, rel=5e-3)
     assert (np.diff(slopes) < 0).all() and slopes[-1] > 0
+
+
+@pytest.mark.parametrize("fraction", [0.1, 0.25, 0.6, 0.9])
+def test_exact_loops_between_levels_have_the_slip_work(fraction):
+    """Force and loop of the elements between the levels are those of a bounded problem, to 1e-4 and 2e-3."""
+    shear, limit = get_slipping_cells()
+    elements = get_elements()
+    amplitude = fraction * elements.yield_displacement[-1]
+    work = find_reversal(shear, limit, amplitude).slip_per_cycle @ limit.ravel() * shear.cell_area
+    passed = np.maximum(amplitude - elements.yield_displacement, 0.0)
+    assert 4 * (elements.stiffness * elements.yield_displacement) @ passed == pytest.approx(
+        work, rel=2e-3
+    )
+    force = slip_from_rest(shear, limit, amplitude).traction.sum() * shear.cell_area
+    found = np.minimum(amplitude, elements.yield_displacement) @ elements.stiffness
+    assert found == pytest.approx(force, rel=1e-4)
 
 
 def test_exact_masing_loop_agrees_with_stepped_cycle(n_steps=12):
