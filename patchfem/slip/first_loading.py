@@ -78,15 +78,13 @@ class LevelForces:
         self.limit = force[-1]
         self.yield_steps = np.diff(yields, prepend=0.0)
 
-        # Part of the force between two displacements that is carried between two yields, where the slope of the curve is
-        # the stiffness of the elements that still stick
-        slope = np.cumsum(stiffness[::-1])[::-1]
-        edges = np.union1d(displacement, yields)
-        middle = (edges[1:] + edges[:-1]) / 2
-        element = np.minimum(np.searchsorted(yields, middle), yields.size - 1)
-        carried = np.zeros((len(self.change), yields.size))
-        level = np.searchsorted(displacement[1:-1], middle)
-        np.add.at(carried, (level, element), slope[element] * np.diff(edges))
+        # Part of the force between two displacements that is carried between two yields
+        def find_force(position: np.ndarray) -> np.ndarray:
+            """Return the force [N] of the elements on first loading to displacements [m]."""
+            return np.minimum.outer(position, yields) @ stiffness
+
+        levels = find_force(displacement)[:, None]
+        carried = np.diff(np.clip(find_force(yields), levels[:-1], levels[1:]), prepend=levels[:-1])
         self.fractions = carried / carried.sum(axis=1, keepdims=True)
 
     def __matmul__(self, stretch: np.ndarray) -> np.ndarray:
