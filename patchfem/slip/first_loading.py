@@ -17,7 +17,7 @@ from . import shear_modes
 OPEN = 0  # State of a cell without contact
 STICK = 1  # State of a cell in contact below its friction limit
 SLIP = 2  # State of a cell at its friction limit
-# Number of displacements of the first loading, 12 to 24, between which the force is a monotone cubic
+# Number of displacements of the first loading, 12 to 24, between which the force is quadratic
 N_LOADING_LEVELS = 16
 N_SLIDERS = 256  # Number of yield displacements of the parallel elements
 # Largest wrong displacement of a cell, relative to the largest one; the error of the force is about its square
@@ -37,10 +37,12 @@ class FirstLoading(NamedTuple):
 
     - displacement (n + 1,): Displacements [m] from 0 to gross slip.
     - force (n + 1, a): Friction forces [N] of the cells in contact.
+    - work (n + 1,): Work [J] of the holder, from which the loop area follows.
     """
 
     displacement: np.ndarray
     force: np.ndarray
+    work: np.ndarray
 
 
 class SpringSliders(NamedTuple):
@@ -70,21 +72,19 @@ class LevelForces:
     """
 
     def __init__(self, loading: FirstLoading, sliders: SpringSliders):
-        displacement, force = loading
+        displacement, force, _ = loading
         stiffness, yields = sliders
         self.change = np.diff(force, axis=0)
         self.limit = force[-1]
         self.yield_steps = np.diff(yields, prepend=0.0)
 
-        # Part of the force between two displacements that is carried between two yields, where the slope of the curve is
-        # the stiffness of the elements that still stick
-        slope = np.cumsum(stiffness[::-1])[::-1]
-        edges = np.union1d(displacement, yields)
-        middle = (edges[1:] + edges[:-1]) / 2
-        element = np.minimum(np.searchsorted(yields, middle), yields.size - 1)
-        carried = np.zeros((len(self.change), yields.size))
-        level = np.searchsorted(displacement[1:-1], middle)
-        np.add.at(carried, (level, element), slope[element] * np.diff(edges))
+        # Part of the force between two displacements that is carried between two yields
+        def find_force(position: np.ndarray) -> np.ndarray:
+            """Return the force [N] of the elements on first loading to displacements [m]."""
+            return np.minimum.outer(position, yields) @ stiffness
+
+        levels = find_force(displacement)[:, None]
+        carried = np.diff(np.clip(find_force(yields), levels[:-1], levels[1:]), prepend=levels[:-1])
         self.fractions = carried / carried.sum(axis=1, keepdims=True)
 
     def __matmul__(self, stretch: np.ndarray) -> np.ndarray:
@@ -98,16 +98,12 @@ class LevelForces:
 class CellElements:
     """Parallel elements of a face whose cells yield at their friction limits, with the names of a `JenkinsSet`.
 
-    - compliance: Shear compliance of the cells.
-    - pressure_limit (ny, nx): Friction limits [Pa].
     - points, limit (a,): Cells in contact, and their friction limits [N].
     - loading: First loading of these cells.
     - stiffness, yield_displacement (t,): [N/m] and [m].
     - force_matrix: Forces of the cells in contact per stretch of the elements.
     """
 
-    compliance: CellCompliance
-    pressure_limit: np.ndarray
     points: np.ndarray
     limit: np.ndarray
     loading: FirstLoading
@@ -159,11 +155,15 @@ def find_first_loading(compliance: CellCompliance, limit: np.ndarray) -> FirstLo
     gross_slip = float(compliance.product(limit)[is_closed].max())
     displacements = gross_slip * _space_evenly_at_ends(N_LOADING_LEVELS)
     force = np.zeros((displacements.size, np.count_nonzero(is_closed)))
+    work = np.zeros(displacements.size)
     traction = np.zeros(limit.shape)
     for k, displacement in enumerate(displacements[1:], 1):
-        traction = slip_from_rest(compliance, limit, displacement, traction).traction
+        solution = slip_from_rest(compliance, limit, displacement, traction)
+        traction = solution.traction
         force[k] = traction[is_closed] * compliance.cell_area
-    return FirstLoading(frozen_array(displacements), frozen_array(force))
+        # The work is minus the least energy, which changes by minus the force per displacement
+        work[k] = np.vdot(traction, displacement - solution.slope) / 2 * compliance.cell_area
+    return FirstLoading(frozen_array(displacements), frozen_array(force), frozen_array(work))
 
 
 def _space_evenly_at_ends(count: int) -> np.ndarray:
@@ -218,7 +218,9 @@ def slip_from_rest(
 
 
 def make_spring_sliders(displacement, force) -> SpringSliders:
-    """Make parallel elements whose first loading is a given curve, interpolated by monotone cubics.
+    """Make parallel elements whose first loading is a given curve.
+
+    Where the slope of the curve rises, its mean replaces it.
 
     Parameters
     ----------
@@ -229,20 +231,28 @@ def make_spring_sliders(displacement, force) -> SpringSliders:
     -------
     SpringSliders
     """
-    from scipy.interpolate import PchipInterpolator
+    from scipy.optimize import isotonic_regression
 
-    knots = displacement[-1] * _space_evenly_at_ends(N_SLIDERS)
-    slopes = np.diff(PchipInterpolator(displacement, force)(knots)) / np.diff(knots)
-    # A slope that would rise again is the round-off of the interpolation
-    slopes = np.minimum.accumulate(np.maximum(slopes, 0.0))
+    steps = np.diff(displacement)
+    slopes = isotonic_regression(np.diff(force) / steps, weights=steps, increasing=False).x
     stiffness = -np.diff(slopes, append=0.0)
     is_kept = stiffness > MIN_STIFFNESS_RATIO * slopes[0]
     stiffness = stiffness[is_kept]
-    yields = knots[1:][is_kept]
+    yields = displacement[1:][is_kept]
     # The friction limit is that of the curve
     return SpringSliders(
         frozen_array(stiffness * force[-1] / (stiffness @ yields)), frozen_array(yields)
     )
+
+
+def _interpolate_force(loading: FirstLoading) -> np.ndarray:
+    """Return displacements (t + 1,) [m] and forces [N] of the curve of a first loading that has its forces and its work."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    displacement, force, work = loading
+    knots = displacement[-1] * _space_evenly_at_ends(N_SLIDERS)
+    curve = CubicHermiteSpline(displacement, work, force.sum(axis=1)).derivative()
+    return np.array([knots, curve(knots)])
 
 
 def make_cell_elements(compliance: CellCompliance, limit: np.ndarray) -> CellElements:
@@ -263,11 +273,11 @@ def make_cell_elements(compliance: CellCompliance, limit: np.ndarray) -> CellEle
         If the tractions are not found.
     """
     loading = find_first_loading(compliance, limit)
-    sliders = make_spring_sliders(loading.displacement, loading.force.sum(axis=1))
+    sliders = make_spring_sliders(*_interpolate_force(loading))
     points = np.flatnonzero(limit > 0)
     force_limit = limit.ravel()[points] * compliance.cell_area
     forces = LevelForces(loading, sliders)
-    return CellElements(compliance, limit, points, force_limit, loading, *sliders, forces)
+    return CellElements(points, force_limit, loading, *sliders, forces)
 
 
 def list_band_sliders(
@@ -284,24 +294,25 @@ def list_band_sliders(
     n_bands : int
         Number of bands; one without load yields at once.
     """
-    displacement, force = elements.loading
+    force = elements.loading.force
+    knots, curve = _interpolate_force(elements.loading)
     out = []
     for band in range(n_bands):
         own = force[:, bands[elements.points] == band].sum(axis=1)
         if own[-1] > 0:
-            out.append(make_spring_sliders(displacement, own))
+            out.append(make_spring_sliders(knots, np.interp(curve, force.sum(axis=1), own)))
         else:
             out.append(SpringSliders(np.ones(1), np.zeros(1)))
     return out
 
 
-def find_reversal(elements: CellElements, amplitude: float) -> ReversalState:
+def find_reversal(compliance: CellCompliance, limit: np.ndarray, amplitude: float) -> ReversalState:
     """Find the state of a face at the reversal of steady cycles with a displacement amplitude [m].
 
-    In a steady cycle each stroke slips twice as far as the first loading to the amplitude (Masing).
+    In a steady cycle each stroke slips twice as far as the first loading to the amplitude (Masing). The compliance and the
+    friction limits [Pa] are those of `find_first_loading`.
     """
-    limit = elements.pressure_limit
-    solution = slip_from_rest(elements.compliance, limit, amplitude)
+    solution = slip_from_rest(compliance, limit, amplitude)
     is_closed = limit > 0
     slips = is_closed & (np.abs(solution.traction) >= limit)
     slip = np.where(slips, np.maximum(-solution.slope, 0.0), 0.0)

@@ -2,7 +2,7 @@
 
 Both take the same contact: of the flat pieces 23 % stay in contact with 0.1 mrad about either axis, and 15 % with both. But
 shear has a direction, so that the roll costs more stiffness and more damping. Of 398 N/um in shear 226 remain with the
-tilt alone, 187 with the roll alone and 171 with both; the work of a cycle of 1 um falls by 11, 16 and 23 %.
+tilt alone, 187 with the roll alone and 172 with both; the work of a cycle of 1 um falls by 11, 16 and 23 %.
 
 The pieces are those of the rig under 26 lbf, pressed over the whole face ([contact.area], 128 cells along each side), with
 Coulomb friction of 0.3 and elastic shear. The errors are below 3 % of each number.

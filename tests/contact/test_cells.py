@@ -310,7 +310,7 @@ def test_exact_cattaneo_mindlin(poisson, radius=0.01, friction=0.3, n_cells=128)
     shear = make_open_cells((n_cells, n_cells), size, stack, "shear")
     limit = friction * pressed.pressure
     elements = make_cell_elements(shear, limit)
-    displacement, cell_force = elements.loading
+    displacement, cell_force, work_found = elements.loading
 
     stiffness = 8 * half * mu / (2 * (2 - poisson))
     gross = 1.5 * friction * LOAD / stiffness
@@ -318,6 +318,9 @@ def test_exact_cattaneo_mindlin(poisson, radius=0.01, friction=0.3, n_cells=128)
     exact = load * (1 - (1 - np.minimum(displacement / gross, 1)) ** 1.5)
     assert displacement[-1] == pytest.approx(gross, rel=1e-3)
     assert cell_force.sum(axis=1) == pytest.approx(exact, abs=1e-4 * load)
+    left = np.maximum(1 - displacement / gross, 0.0) ** 2.5
+    exact_work = load * (displacement - 0.4 * gross * (1 - left))
+    assert work_found == pytest.approx(exact_work, abs=1e-4 * load * gross)
 
     # Loop of half the amplitude of gross slip, by Masing's rule
     amplitude = gross / 2
@@ -326,6 +329,6 @@ def test_exact_cattaneo_mindlin(poisson, radius=0.01, friction=0.3, n_cells=128)
     force = load * (1 - 0.5**1.5)
     work = load * (amplitude - 0.4 * gross * (1 - 0.5**2.5))
     assert loop == pytest.approx(8 * (work - force * amplitude / 2), rel=1e-3)
-    status = find_reversal(elements, amplitude).status
+    status = find_reversal(shear, limit, amplitude).status
     stick = np.sqrt((status == STICK).sum() * cells.cell_area / np.pi)
     assert stick == pytest.approx(half * (1 - force / load) ** (1 / 3), rel=0.015)

@@ -18,7 +18,7 @@ import numpy as np
 
 import patchfem as pf
 from patchfem.runs.patch import area
-from patchfem.slip.first_loading import find_reversal, make_cell_elements
+from patchfem.slip.first_loading import find_reversal, slip_from_rest
 
 # Number of the first block. Other numbers below 900 000 served to choose the estimate of errors.
 FIRST_SEED = 941_000
@@ -131,14 +131,14 @@ def compute_errors(seed: int, folder: Path) -> dict[str, tuple[float, float, flo
     reference = area.press_face(patch_model, cells)
     values = area.compute_face_values(reference)
 
-    # The loop of parallel elements between two reversals, by Masing's rule
+    # Slipping cells carry their limits in each stroke of a steady cycle
     limit = FRICTION * reference.pressed.pressure
-    elements = make_cell_elements(reference.slip_compliance, limit)
-    stiffness, yields = elements.stiffness, elements.yield_displacement
-    amplitude = model.slide.amplitude
-    values["friction_force_peak"] = stiffness @ np.minimum(amplitude, yields)
-    values["loop_area"] = 4 * stiffness @ (yields * np.maximum(amplitude - yields, 0.0))
-    values["stick_area_fraction"] = find_reversal(elements, amplitude).stick_fraction
+    slip = (reference.slip_compliance, limit, model.slide.amplitude)
+    traction = slip_from_rest(*slip).traction
+    state = find_reversal(*slip)
+    values["friction_force_peak"] = traction.sum() * cells.normal.cell_area
+    values["loop_area"] = state.slip_per_cycle @ limit.ravel() * cells.normal.cell_area
+    values["stick_area_fraction"] = state.stick_fraction
     return {
         name: (measure.value, abs(measure.value - values[name]), measure.error)
         for name, measure in result.measures.items()

@@ -54,9 +54,14 @@ def find_face_reversal(result, patch: AreaPatch) -> "first_loading.ReversalState
     if law_has_trait(model.friction.law, "bonds"):
         return _find_in_frames(result) if patch is result.patch else None
     length = make_law(model.friction, patch.pressure.load).length
-    elements = jenkins_elements.elements(patch, model.friction.static, length)
     key = ("reversal", patch, model.friction.static, length, amplitude)
-    return store.get_or_compute(key, lambda: first_loading.find_reversal(elements, amplitude))
+
+    def find() -> first_loading.ReversalState:
+        """Find the state, which the cache keeps for the exported fields."""
+        softened = jenkins_elements.soften_cells(patch, model.friction.static, length)
+        return first_loading.find_reversal(*softened, amplitude)
+
+    return store.get_or_compute(key, find)
 
 
 def _find_in_frames(result) -> "first_loading.ReversalState | None":

@@ -42,14 +42,23 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
 
     def make():
         """Make the elements, which the cache keeps for all runs of the patch."""
-        compliance = patch.slip_compliance
         if patch.model.area is not None:
-            limit = static * np.reshape(patch.normal_stress, patch.shape)
-            return first_loading.make_cell_elements(add_bonds(compliance, limit, length), limit)
+            return first_loading.make_cell_elements(*soften_cells(patch, static, length))
         limit = static * patch.normal_stress * patch.pieces.interface.weight
-        return shear_modes.make_jenkins_set(compliance, limit, length)
+        return shear_modes.make_jenkins_set(patch.slip_compliance, limit, length)
 
     return store.get_or_compute(("elements", patch, static, length), make)
+
+
+def soften_cells(
+    patch: Patch, static: float, length: float
+) -> "tuple[cells.CellCompliance, np.ndarray]":
+    """Return the shear compliance of the cells of a face with the bonds of a law, and their friction limits (ny, nx) [Pa].
+
+    The parameters are those of `elements`.
+    """
+    limit = static * np.reshape(patch.normal_stress, patch.shape)
+    return add_bonds(patch.slip_compliance, limit, length), limit
 
 
 def make_elements(patch: Patch, static: float, length: float) -> PatchElements:
