@@ -74,7 +74,9 @@ POOLED_ERROR = 0.5
 # Measures whose error is not relative to their value
 UNPOOLED_MEASURES = {"drift_per_cycle", *ERROR_MEASURES}
 EXACT_STEPS_PER_CYCLE = 16  # steps of laws that are linear between events, which are exact
-# Relative error of the integral of the polynomial of order 5 in a step whose fastest vibration has a phase p, by p^6
+# Relative error of the integral of the polynomial of order 5 over a cycle, by d p^5, with the phases d of the drive and p of
+# the fastest vibration in a step. That of a step has p^7; between two events these are a difference, of which the ends with
+# p^6 remain. The ends of a cycle are about as many as its radians.
 INTEGRAL_REMAINDER = 1 / 100_800
 DISTORTION = "acceleration_distortion"
 # Smallest distance of the drive from the frequencies of an undamped mode, relative to the squared frequency of the drive,
@@ -268,8 +270,8 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
     """March cases, and those that miss their tolerance again with more steps.
 
     Yields indices of cases and their march, for those that meet their tolerance after each march, and at the end for the
-    others. The errors follow from the march before, with fewer steps. Exact steps need a single march; cases without a
-    closed form are left out.
+    others. The errors follow from the one or two marches before, with fewer steps. Exact steps need a single march; cases
+    without a closed form are left out.
     """
     remaining = np.arange(len(cases.parameters))
     if is_linear_between_events(cases):
@@ -282,17 +284,17 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
             yield remaining, Refined(march, errors, EXACT_STEPS_PER_CYCLE, is_met)
         return
 
-    coarse = march_cases(cases, BATCH_STEPS_PER_CYCLE[0])
+    coarser = [march_cases(cases, BATCH_STEPS_PER_CYCLE[0]).values]
     for count in BATCH_STEPS_PER_CYCLE[1:]:
         part_cases, part = _select(cases, remaining), _select(scales, remaining)
         fine = march_cases(part_cases, count)
-        errors = estimate_errors(part_cases, fine.values, coarse.values, count)
+        errors = estimate_errors(part_cases, [fine.values, *coarser], count)
         is_met = np.ones(remaining.size, bool)
         for name in fine.values.keys() - set(INTERNAL_VALUES):
             value = fine.values[name]
             allowed = part.tolerance * np.abs(value) + find_floor(name, fine.values, part)
             # A measure that only one of the two marches has shows an event that the other missed.
-            is_absent = np.isnan(value) & np.isnan(coarse.values[name])
+            is_absent = np.isnan(value) & np.isnan(coarser[0][name])
             is_met &= (errors[name] <= allowed) | is_absent
 
         # Only cases beyond their tolerance are marched again.
@@ -306,7 +308,7 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
         remaining = remaining[~is_done]
         if not remaining.size:
             return
-        coarse = _select(fine, ~is_done)
+        coarser = [_select(values, ~is_done) for values in (fine.values, coarser[0])]
 
 
 def find_repeat_error(cases: Cases, same: float) -> np.ndarray:
@@ -329,22 +331,23 @@ def find_size(name: str, values: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def estimate_errors(
-    cases: Cases, fine: dict[str, np.ndarray], coarse: dict[str, np.ndarray], steps: int
+    cases: Cases, marches: Sequence[dict[str, np.ndarray]], steps: int
 ) -> dict[str, np.ndarray]:
-    """Return the errors (n,) by name from the values of a march and of one with half its steps.
+    """Return the errors (n,) by name from the values of a march and of one or two coarser ones.
 
     Parameters
     ----------
     cases : Cases
         The n cases.
-    fine, coarse : dict
-        Values (n,) by name.
+    marches : sequence of dict
+        Values (n,) by name; each march after the first has half the steps of the one before.
     steps : int
         Steps per cycle of the first march.
     """
+    fine = marches[0]
     repeat_error = find_repeat_error(cases, SAME_SMOOTH_CYCLE / steps**3)
     with np.errstate(all="ignore"):
-        errors = convergence_errors(fine, coarse, order=BATCH_ORDER)
+        errors = convergence_errors(*marches, order=BATCH_ORDER, max_order=BATCH_ORDER)
 
         # A change that is small by accident does not give an error far below those of the other measures, relative to
         # the value of a measure or to the terms of a difference.
@@ -389,11 +392,11 @@ def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dic
     errors = {}
     for name in values:
         size = find_size(name, values)
-        relative = INTEGRAL_REMAINDER * phase**6
+        relative = INTEGRAL_REMAINDER * drive_phase * phase**5
         if name == DISTORTION:
             # The acceleration of the third harmonic is 9 omega^2 times a slide that has three times the phase.
             size = np.fmax(size, 1.0)
-            relative = relative + 9 * INTEGRAL_REMAINDER * (3 * drive_phase) ** 6
+            relative = relative + 9 * INTEGRAL_REMAINDER * drive_phase * (3 * drive_phase) ** 5
         errors[name] = total_error(name, values, [relative * size], repeat_error)
 
     slide = values[AMPLITUDE] / np.abs(cases.parameters[:, Number.OUTPUT])

@@ -240,10 +240,11 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
 
 def find_compliance_key(law: Friction, tables: Tables) -> str:
     """Return the key in the tables that allows partial slip under a law, or "" if there is none or nothing rubs."""
-    if law is not None and law.static == 0:
-        return ""
     owner = law if isinstance(law, Interface) else tables.contact
-    return owner.compliance_key if owner is not None else ""
+    # The numbers of a law without a patch may be arrays of many cases.
+    if owner is None or (law is not None and law.static == 0):
+        return ""
+    return owner.compliance_key
 
 
 def _is_uneven(law: Friction, tables: Tables) -> bool:
