@@ -118,7 +118,7 @@ class RowsComparison(Comparison):
             "held_out": (logs, fitted.held_out),
             "left_out": (left_out, ~np.isnan(left_out)),
         }
-        return {
-            name: compute_rms_scores(self.cells, values, counts & is_in_group)
-            for name, (values, is_in_group) in groups.items()
-        }
+        scores = {}
+        for name, (values, is_in_group) in groups.items():
+            scores[name] = compute_rms_scores(self.cells, values, counts & is_in_group)
+        return scores

@@ -144,9 +144,8 @@ class RunInputs:
     def has_error_meshes(self) -> bool:
         """Whether each patch on whose mesh the motion depends is solved on a coarser mesh too."""
         depends = self.plan.model.motion_depends_on_mesh
-        return all(
-            face.patches[1] is not None for face in self.faces if face.partial_slip or depends
-        )
+        moving = [face for face in self.faces if depends or face.partial_slip]
+        return all(face.patches[1] is not None for face in moving)
 
 
 class Settings(NamedTuple):
