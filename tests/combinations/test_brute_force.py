@@ -280,3 +280,15 @@ def test_agrees_with_engines(name, law):
         measure = measures[one]
         doubt = reference.doubts[one] + 2e-4 * abs(measure.value)
         assert abs(measure.value - reference.values[one]) <= measure.error + doubt, one
+
+
+def test_start_at_full_speed_does_not_overshoot():
+    """Pieces that relax within a few steps after a start at full speed keep the force below that of the speed."""
+    text = PATCH + SHEAR + write_law("tanh") + BENCH
+    peaks = [
+        run_scene(text, f"accuracy.steps_per_cycle={n}", estimate=False)
+        .measures["friction_force_peak"]
+        .value
+        for n in (400, 6400)
+    ]
+    assert peaks[0] == pytest.approx(peaks[1], rel=3e-4)  # 2e-2 by the formula of order 2 alone
