@@ -83,9 +83,6 @@ LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
 # compliance of ports that share a force (`time_march.REDUNDANT`)
 CREEP = 1e-7
-# Weight of the change of the rates of pieces between two steps in that of the velocity: with 10 a start at full speed
-# overshoots by 2e-4 at 200 steps per cycle, with 0 by 2e-2
-RELAXATION = 10.0
 TINY = 1e-150  # m, in place of no path; its square is not zero
 
 
@@ -935,7 +932,8 @@ def find_order(system):
         if block == points.first[p + 1] or points.law[block] != Law.TANH:
             continue
         for k in range(points.first_shear[p], points.first_shear[p + 1]):
-            jump = RELAXATION * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k])
+            # With the factor 10 a start at full speed overshoots by 2e-4 at 200 steps per cycle, with 0 by 2e-2.
+            jump = 10 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k])
             jump /= shear[Shear.SCALE, k]
             change = 0.5 * (moves[Port.FREE_VELOCITY, p] - moves[Port.VELOCITY, p])
             change = (abs(change) + abs(jump)) / points.numbers[block, WIDTH]

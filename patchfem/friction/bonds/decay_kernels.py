@@ -79,12 +79,12 @@ def average_integral(a, b, order):
 
 
 @njit(**NJIT_INLINE)
-def average_strength(a, b):
+def average_strength(first, last):
     """Return the mean of the strength between two ages, given their `Decay`."""
-    step = b.age - a.age
-    if abs(step) <= SHORT_STEP * max(abs(a.age), abs(b.age)):
-        return 0.5 * (a.strength + b.strength)
-    return (b.integral - a.integral) / step
+    step = last.age - first.age
+    if abs(step) <= SHORT_STEP * max(abs(first.age), abs(last.age)):
+        return 0.5 * (first.strength + last.strength)
+    return (last.integral - first.integral) / step
 
 
 @njit(**NJIT_INLINE)

@@ -33,7 +33,16 @@ def read_strip(strips, k):
 
 @njit(**NJIT_KERNEL)
 def write_strip(strips, k, strip):
-    """Write a `Strip` to the number k of the array `strips` (capacity, 8)."""
+    """Write a strip to a list.
+
+    Parameters
+    ----------
+    strips : (capacity, 8) array
+        List, changed in place.
+    k : int
+        Number of the strip.
+    strip : Strip
+    """
     for i in range(N_STRIP_ENTRIES):
         strips[k, i] = strip[i]
 
@@ -137,7 +146,15 @@ def join(older, younger, law, still):
 
 @njit(**NJIT_KERNEL)
 def find_misfit(exact, joint, order):
-    """Return the relative error of the strength of bonds whose age changes from `exact` to `joint` [bond lengths]."""
+    """Return the relative error of the strength of bonds that are taken as older or younger than they are.
+
+    Parameters
+    ----------
+    exact, joint : float
+        Age before and after strips are joined [bond lengths].
+    order : float
+        Exponent p of the law.
+    """
     return abs(joint - exact) * (1 + abs(order) / max(exact, MIN_MISFIT_AGE))
 
 

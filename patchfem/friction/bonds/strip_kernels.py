@@ -123,7 +123,17 @@ def find_part_end(i, n):
 
 @njit(**NJIT_KERNEL)
 def find_new_strips(state, law, increment):
-    """Return how many strips form on an `Increment` of a list with `state` (9,) and `law` (k,), 0 or a real number >= 1."""
+    """Return how many strips form on an increment, 0 or a real number >= 1.
+
+    Parameters
+    ----------
+    state : (9,) array
+        Entries of `ListState`.
+    law : (k,) array
+        Entries of `ListLaw`.
+    increment : Increment
+        Part of a slide.
+    """
     if abs(increment.slide) < MIN_PATH or state[ListState.LOAD] <= 0:
         return 0.0
     if increment.growth == 0 or law[ListLaw.IS_STRETCH] > 0:

@@ -93,14 +93,32 @@ class Passage(NamedTuple):
 
 
 @njit(**NJIT_INLINE)
-def mix(a, b, fraction):
-    """Return the value at a fraction of the way from a to b."""
-    return a + fraction * (b - a)
+def mix(first, last, fraction):
+    """Return the value at a fraction of the way from one value to another.
+
+    Parameters
+    ----------
+    first, last : float
+        Values at the fractions 0 and 1.
+    fraction : float
+        Fraction of the way.
+    """
+    return first + fraction * (last - first)
 
 
 @njit(**NJIT_KERNEL)
 def find_ages(strip, law, moved):
-    """Return the `Ages` of a `Strip` of a law with entries `law` (k,) after its bonds have `Moved`."""
+    """Return the `Ages` of the bonds of a strip that have moved.
+
+    Parameters
+    ----------
+    strip : Strip
+        Strip of a list.
+    law : (k,) array
+        Entries of `ListLaw`.
+    moved : Moved
+        Motion since the last step.
+    """
     if law[ListLaw.IS_STRETCH] > 0:
         return Ages(strip.age_1 + moved.damage, strip.age_2 + moved.damage)
 
@@ -122,7 +140,17 @@ def find_ages(strip, law, moved):
 
 @njit(**NJIT_INLINE)
 def find_ends(strip, law, moved):
-    """Return the `Ends` of a `Strip` of a law with entries `law` (k,) after its bonds have `Moved`."""
+    """Return the `Ends` of the bonds of a strip that have moved.
+
+    Parameters
+    ----------
+    strip : Strip
+        Strip of a list.
+    law : (k,) array
+        Entries of `ListLaw`.
+    moved : Moved
+        Motion since the last step.
+    """
     ages = find_ages(strip, law, moved)
     return Ends(find_decay(ages.first, law), find_decay(ages.last, law))
 
