@@ -70,7 +70,6 @@ MAX_LOAD_ITERATIONS = (
 )
 MAX_CUTS = 8  # trials of a line search
 CUT = 0.3  # factor of a step by a trial of the line search
-MIN_CUT = 0.1  # the smallest one for lists
 MAX_OVERSHOOT = (
     0.5  # slope beyond the minimum of a potential, relative to that at the start of a line search
 )
@@ -618,7 +617,7 @@ def solve_forces(system, level, step):
                 slope = find_slope(system, level)
                 if descent <= 0 or slope <= MAX_OVERSHOOT * descent:
                     break
-                fraction *= max(MIN_CUT, descent / (slope + descent))
+                fraction *= max(0.1, descent / (slope + descent))  # at least a tenth per trial
             elif residual < before:
                 break
             else:
