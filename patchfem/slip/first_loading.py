@@ -22,8 +22,6 @@ N_LOADING_LEVELS = 16
 N_SLIDERS = 256  # Number of yield displacements of the parallel elements
 # Largest wrong displacement of a cell, relative to the largest one; the error of the force is about its square
 SLIP_RESIDUAL_TOL = 1e-7
-# Largest number of steps of the solver for one displacement; it takes about 15
-MAX_ITERATIONS = 2000
 # Smallest stiffness of an element relative to their sum; smaller ones are rounding errors of the slope of a curve
 MIN_STIFFNESS_RATIO = 1e-12
 N_CELL_MODES = 12  # Number of shear modes with which a face starts
@@ -163,7 +161,7 @@ def find_first_loading(compliance: CellCompliance, limit: np.ndarray) -> FirstLo
         force[k] = traction[is_closed] * compliance.cell_area
         # The work is minus the least energy, which changes by minus the force per displacement
         work[k] = np.vdot(traction, displacement - solution.slope) / 2 * compliance.cell_area
-    return FirstLoading(frozen_array(displacements), frozen_array(force), frozen_array(work))
+    return FirstLoading(*map(frozen_array, (displacements, force, work)))
 
 
 def _space_evenly_at_ends(count: int) -> np.ndarray:
@@ -208,10 +206,10 @@ def slip_from_rest(
         return BoundedSolution(traction, np.zeros(0), slope, 0, 0.0)
 
     problem = BoundedProblem(np.full(limit.shape, -displacement), -limit, limit)
-    solution = solve_bounded(compliance, problem, start, SLIP_RESIDUAL_TOL, MAX_ITERATIONS)
+    solution = solve_bounded(compliance, problem, start, SLIP_RESIDUAL_TOL)
     if not solution.residual <= SLIP_RESIDUAL_TOL:
         raise NotConverged(
-            f"contact: partial slip did not converge; after {MAX_ITERATIONS} steps the displacement "
+            f"contact: partial slip did not converge; after {solution.n_iterations} steps the displacement "
             f"is wrong by {solution.residual:.1e} of the largest one"
         )
     return solution
@@ -315,7 +313,7 @@ def find_reversal(compliance: CellCompliance, limit: np.ndarray, amplitude: floa
     solution = slip_from_rest(compliance, limit, amplitude)
     is_closed = limit > 0
     slips = is_closed & (np.abs(solution.traction) >= limit)
-    slip = np.where(slips, np.maximum(-solution.slope, 0.0), 0.0)
+    slip = slips * np.maximum(-solution.slope, 0.0)
     status = np.where(is_closed, STICK, OPEN) + slips
     return ReversalState(status.ravel().astype(np.int8), 4 * slip.ravel())
 

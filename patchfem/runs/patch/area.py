@@ -6,6 +6,7 @@ changes over the grids, of a static measure as of a motion, contains both.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 from time import process_time
 
@@ -229,10 +230,9 @@ def compute_face_values(patch: AreaPatch) -> Values:
     area = pieces.length * pieces.width * pieces.pairs
     normal = patch.pieces.normal
     edges = cell_edges.find_face_edges(normal, pressure, patch.pressed.gap)
-
-    def compute_stiffness(cells, motion=1.0) -> float:
-        """Return the stiffness of the contact against a motion of its cells."""
-        return cell_edges.compute_contact_stiffness(cells, active, motion, edges.shift)
+    compute_stiffness = partial(
+        cell_edges.compute_contact_stiffness, active=active, shift=edges.shift
+    )
 
     # What a face has in common with a patch whose pressure varies along x alone
     edge_values = EdgeValues(
@@ -240,24 +240,19 @@ def compute_face_values(patch: AreaPatch) -> Values:
         width=np.nan,
         normal=compute_stiffness(normal),
         tangential=compute_stiffness(patch.pieces.tangential),
-        rotational=compute_stiffness(normal, normal.x),
+        rotational=compute_stiffness(normal, motion=normal.x),
     )
     # What only a face has
     hardness = patch.model.area.hardness
     across = AcrossValues(
         roll=patch.model.gap.roll + patch.pressed.tilt_y,
         moment=patch.normal_stress * patch.pieces.interface.weight @ patch.y,
-        stiffness=compute_stiffness(normal, normal.y[:, None]),
+        stiffness=compute_stiffness(normal, motion=normal.y[:, None]),
         yielded_fraction=None if hardness is None else (pressure >= hardness).mean(),
     )
     peak = estimate_face_peak(normal.x, normal.y, pressure)
     values = assemble_static_values(pieces.length, area, state, peak, edge_values, across)
     return {name: float(value) for name, value in values.items()}
-
-
-def count_boundary_sides(active: np.ndarray) -> int:
-    """Return the number of sides between cells in contact, `active` (ny, nx), and others."""
-    return sum(np.count_nonzero(np.diff(active, axis=axis)) for axis in (0, 1))
 
 
 def may_peak_at_side(patch: AreaPatch) -> bool:
@@ -299,16 +294,17 @@ def with_face_measures(
     errors = convergence_errors(*series) if len(series) > 1 else {}
     larger_terms = list_larger_terms(values, pieces.length / 2, pieces.width / 2)
     active = patch.pressed.pressure > 0
-    edge_error = MIN_CONTACT_EDGE_ERROR_IN_CELLS * count_boundary_sides(active) / active.size
-    area = values["contact_area"] / (values["contact_fraction"] or 1.0)
+    n_edge_sides = sum(np.count_nonzero(np.diff(active, axis=axis)) for axis in (0, 1))
+    edge_error = MIN_CONTACT_EDGE_ERROR_IN_CELLS * n_edge_sides / active.size
+    area = pieces.length * pieces.width * pieces.pairs
     min_errors = {"contact_fraction": edge_error, "contact_area": edge_error * area}
     measures = {}
     for name, value in values.items():
         larger_term = larger_terms.get(name, 0.0)
         error = errors.get(name)
         if errors:
-            error = max(error, MIN_RELATIVE_ERROR * max(abs(value), larger_term))
-            error = max(error, min_errors.get(name, 0.0))
+            min_error = MIN_RELATIVE_ERROR * max(abs(value), larger_term)
+            error = max(error, min_error, min_errors.get(name, 0.0))
         measure = make_measure(name, value, error, CELLS_SOURCE)
         measures[name] = replace(measure, floor=max(measure.floor, tolerance * larger_term))
 

@@ -55,13 +55,8 @@ def find_face_reversal(result, patch: AreaPatch) -> "first_loading.ReversalState
         return _find_in_frames(result) if patch is result.patch else None
     length = make_law(model.friction, patch.pressure.load).length
     key = ("reversal", patch, model.friction.static, length, amplitude)
-
-    def find() -> first_loading.ReversalState:
-        """Find the state, which the cache keeps for the exported fields."""
-        softened = jenkins_elements.soften_cells(patch, model.friction.static, length)
-        return first_loading.find_reversal(*softened, amplitude)
-
-    return store.get_or_compute(key, find)
+    cells = jenkins_elements.soften_cells(patch, model.friction.static, length)
+    return store.get_or_compute(key, lambda: first_loading.find_reversal(*cells, amplitude))
 
 
 def _find_in_frames(result) -> "first_loading.ReversalState | None":
