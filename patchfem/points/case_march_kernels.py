@@ -17,7 +17,15 @@ from .case_observers_kernels import (
     start_cycle,
     start_window,
 )
-from .case_rows import SAME_CASE_CYCLE, SAME_SMOOTH_CYCLE, WINDOW_STEPS, Now, Number, Seen
+from .case_rows import (
+    N_FINAL_WINDOWS,
+    SAME_CASE_CYCLE,
+    SAME_SMOOTH_CYCLE,
+    WINDOW_STEPS,
+    Now,
+    Number,
+    Seen,
+)
 from .law_rows import Law, Memory
 from .smooth_laws_kernels import PointLaw
 
@@ -88,7 +96,8 @@ def march_cases(steps, parameters, laws, nows, seens, histories, loops):
 
         # State at the start
         point = linear.make_point(case, law.numbers)
-        block = linear.make_block(case, point, float(steps), 1.0)
+        coarse = linear.make_block(case, point, float(steps), 1.0)
+        fine = linear.make_block(case, point, float(steps), WINDOW_STEPS)
         body = smooth.make_body(case, law, float(steps))
         now[Now.SLIDE] = case[Number.SLIDE]
         now[Now.VELOCITY] = case[Number.VELOCITY]
@@ -96,19 +105,23 @@ def march_cases(steps, parameters, laws, nows, seens, histories, loops):
             now[Now.VELOCITY] ** 2 + case[Number.STIFFNESS] * now[Now.SLIDE] ** 2
         )
         if is_linear:
-            linear.start(block, now)
+            linear.start(coarse, now)
         else:
             smooth.start(body, now)
 
         n_cycles = int(case[Number.CYCLES])
-        first = n_cycles - int(case[Number.WINDOW])
+        window = int(case[Number.WINDOW])
+        first = n_cycles - window
         cycle = 0
         n_pieces = 0
         while cycle < n_cycles:
             observes = cycle >= first
             if cycle == first:
                 start_window(now, seen)
-                block = linear.make_block(case, point, float(steps), WINDOW_STEPS)
+            # The phasors from which a steady amplitude is extrapolated have the same error.
+            n_left = n_cycles - cycle - 1
+            is_fine = observes or (n_left % window == 0 and n_left < N_FINAL_WINDOWS * window)
+            block = fine if is_fine else coarse
             for k in range(now.shape[0]):
                 before[k] = now[k]
             loop = loops[j, max(loops.shape[1] - n_cycles + cycle, 0)]

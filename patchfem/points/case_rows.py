@@ -12,6 +12,7 @@ SAME_CASE_CYCLE = 1e-10
 SAME_SMOOTH_CYCLE = 2e-2
 MAX_STEP_PHASE = 1.0  # largest phase of the vibration of a sticking point in an exact step [rad]
 MAX_STEPS = 256  # largest number of exact steps per cycle
+N_FINAL_WINDOWS = 5  # last windows from whose last cycles a steady amplitude is extrapolated
 WINDOW_STEPS = 4.0  # exact steps of a measured cycle per step of another one
 
 

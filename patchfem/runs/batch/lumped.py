@@ -300,11 +300,8 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
         # Only cases beyond their tolerance are marched again.
         is_done = is_met | (count == BATCH_STEPS_PER_CYCLE[-1])
         if is_done.any():
-            march = _select(fine, is_done)
-            yield (
-                remaining[is_done],
-                Refined(march, _select(errors, is_done), count, is_met[is_done]),
-            )
+            parts = (_select(one, is_done) for one in (fine, errors))
+            yield remaining[is_done], Refined(*parts, count, is_met[is_done])
         remaining = remaining[~is_done]
         if not remaining.size:
             return
@@ -358,11 +355,11 @@ def estimate_errors(
         squares = np.where(is_changed & (parts < 1), parts, 0.0) ** 2
         mean = squares.sum(axis=0) / np.fmax(np.sign(squares).sum(axis=0), 1)
         pooled = POOLED_ERROR * np.sqrt(mean)
-        added = dict(zip(names, pooled * is_changed))
-        for name, error in errors.items():
-            terms = [error, added[name] * sizes[name]] if name in added else [error]
-            errors[name] = total_error(name, fine, terms, repeat_error)
-    return errors
+        for name, part in zip(names, pooled * is_changed):
+            errors[name] += part * sizes[name]
+        return {
+            name: total_error(name, fine, [error], repeat_error) for name, error in errors.items()
+        }
 
 
 def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dict[str, np.ndarray]:
