@@ -307,8 +307,16 @@ def list_band_sliders(
 def find_reversal(compliance: CellCompliance, limit: np.ndarray, amplitude: float) -> ReversalState:
     """Find the state of a face at the reversal of steady cycles with a displacement amplitude [m].
 
-    In a steady cycle each stroke slips twice as far as the first loading to the amplitude (Masing). The compliance and the
-    friction limits [Pa] are those of `find_first_loading`.
+    In a steady cycle each stroke slips twice as far as the first loading to the amplitude (Masing).
+
+    Parameters
+    ----------
+    compliance : CellCompliance
+        Displacement of the cells in shear per traction.
+    limit : (ny, nx) array
+        Friction limits [Pa].
+    amplitude : float
+        Displacement amplitude [m].
     """
     solution = slip_from_rest(compliance, limit, amplitude)
     is_closed = limit > 0

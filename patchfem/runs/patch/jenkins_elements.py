@@ -55,7 +55,14 @@ def soften_cells(
 ) -> "tuple[cells.CellCompliance, np.ndarray]":
     """Return the shear compliance of the cells of a face with the bonds of a law, and their friction limits (ny, nx) [Pa].
 
-    The parameters are those of `elements`.
+    Parameters
+    ----------
+    patch : Patch
+        Pressed face.
+    static : float
+        Coefficient of friction.
+    length : float
+        Bond length [m], or 0.
     """
     limit = static * np.reshape(patch.normal_stress, patch.shape)
     return add_bonds(patch.slip_compliance, limit, length), limit
