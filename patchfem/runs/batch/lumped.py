@@ -357,9 +357,9 @@ def estimate_errors(
         pooled = POOLED_ERROR * np.sqrt(mean)
         for name, part in zip(names, pooled * is_changed):
             errors[name] += part * sizes[name]
-        return {
-            name: total_error(name, fine, [error], repeat_error) for name, error in errors.items()
-        }
+        for name, error in errors.items():
+            errors[name] = total_error(name, fine, [error], repeat_error)
+        return errors
 
 
 def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dict[str, np.ndarray]:
