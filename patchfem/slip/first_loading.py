@@ -17,8 +17,10 @@ from . import shear_modes
 OPEN = 0  # State of a cell without contact
 STICK = 1  # State of a cell in contact below its friction limit
 SLIP = 2  # State of a cell at its friction limit
-# Number of displacements of the first loading, 12 to 24, between which the force is quadratic
-N_LOADING_LEVELS = 16
+# Number of cells along the face per displacement of the first loading, so that the changes between grids contain the error
+# of its curve: with 16 displacements on every grid 43 of 60 loop areas held
+CELLS_PER_LEVEL = 8
+MIN_LOADING_LEVELS = 4  # displacements on a grid of 32 cells
 N_SLIDERS = 256  # Number of yield displacements of the parallel elements
 # Largest wrong displacement of a cell, relative to the largest one; the error of the force is about its square
 SLIP_RESIDUAL_TOL = 1e-7
@@ -151,7 +153,8 @@ def find_first_loading(compliance: CellCompliance, limit: np.ndarray) -> FirstLo
     if not is_closed.any():
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     gross_slip = float(compliance.product(limit)[is_closed].max())
-    displacements = gross_slip * _space_evenly_at_ends(N_LOADING_LEVELS)
+    n_levels = max(limit.shape) // CELLS_PER_LEVEL
+    displacements = gross_slip * _space_evenly_at_ends(max(n_levels, MIN_LOADING_LEVELS))
     force = np.zeros((displacements.size, np.count_nonzero(is_closed)))
     work = np.zeros(displacements.size)
     traction = np.zeros(limit.shape)
