@@ -249,8 +249,12 @@ class RecordedDrive:
         return float(self.time[-1])
 
     def values(self, t):
-        """Evaluate the drive signal [m s-2] at times t (k,) >= 0 [s]."""
-        return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
+        """Evaluate the drive signal [m s-2] at times t (k,) >= 0 [s]; one beyond the end by round-off is the end."""
+        t = np.asarray(t, float)
+        end = self.time[-1]
+        # The sum of equal steps may exceed the end by round-off.
+        t = np.where(t <= end * (1 + 1e-12), np.minimum(t, end), t)
+        return np.interp(t, self.time, self.value, right=0.0)
 
     def find_line_loss(self, modes: ModalBasis) -> LineLoss:
         """Estimate what the straight lines between the rows take from the record of a smooth signal.

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from patchfem import SceneError, plan, run
 from patchfem.core import Outcome, SineDrive
 from patchfem.scene import loads
-from patchfem.structure.drives import SweepDrive, make_levels, make_step
+from patchfem.structure.drives import RecordedDrive, SweepDrive, make_levels, make_step
 from patchfem.structure.tones import make_tones
 from patchfem.time_steps.time_march import march
 
@@ -87,6 +87,18 @@ def test_exact_step_response_agrees_with_closed_form():
         -2 * zeta * OMEGA * response.slide_rate - OMEGA**2 * response.slide, abs=1e-9
     )
     assert response.base_acceleration == pytest.approx(9.0)
+
+
+def test_exact_record_does_not_end_before_its_last_sample():
+    """A time that exceeds the end of a record by round-off has its last value; the signal is 0 later.
+
+    Sums of equal steps exceed the end, so that the last sample of a run had a false peak of the acceleration.
+    """
+    record = RecordedDrive(np.array([0.0, 0.1]), np.array([0.0, 3.0]), 0.1)
+    step = 0.1 / 3
+    for end in (np.nextafter(0.1, 1), 3 * step, step + step + step):
+        assert record.values(end) == pytest.approx(3.0, rel=1e-12), end
+    assert record.values(0.1001) == 0
 
 
 def test_exact_loss_of_straight_lines(tmp_path):
