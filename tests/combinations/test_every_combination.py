@@ -9,6 +9,7 @@ from functools import cache
 
 import pytest
 from scene_runs import run_scene
+from scene_texts import THREE_CYCLES
 
 from patchfem.scene import loads
 from patchfem.scene.scene import SceneError
@@ -62,22 +63,7 @@ substrate = {{young = "{}", poisson = 0.3, density = "7800 kg/m^3"}}
 radius = "{}"
 """
 STEEL = PATCH.format("200 GPa", "10 m")
-RIG = """\
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.02
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 3
-[accuracy]
-steps_per_cycle = 400
-"""
+RIG = THREE_CYCLES + "[accuracy]\nsteps_per_cycle = 400\n"
 BENCH = (
     '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
     "[accuracy]\nsteps_per_cycle = 400\n"
