@@ -77,10 +77,14 @@ def test_exact_hard_wedge_on_springs(angle=2.8e-3):
     slope = SPRINGS * angle
     hardness = float(np.sqrt(2 * LOAD * slope / SIDE) / 2)
     length = LOAD / SIDE / hardness + hardness / (2 * slope)
-    face = {"area": {"hardness": f"{hardness!r} Pa"}, "tilt": {"angle": f"{angle} rad"}}
-    result = run(RIGID, face)
+    result = run(
+        RIGID, {"area": {"hardness": f"{hardness!r} Pa"}, "tilt": {"angle": f"{angle} rad"}}
+    )
     check(result, contact_fraction=length / SIDE)
-    check(result, 0.03, yielded_fraction=(length - hardness / slope) / SIDE)
+
+    # Yielded cells are counted, here in whole columns, of which the edge may have two too many
+    yielded = (length - hardness / slope) / SIDE
+    check(result, 2 / result.patch.shape[1] / yielded, yielded_fraction=yielded)
 
 
 def test_exact_sphere_on_springs(radius=0.5):
@@ -96,8 +100,8 @@ def test_exact_sphere_on_springs(radius=0.5):
     )
 
 
-@pytest.mark.parametrize("load, radius", [(LOAD, 0.5), (LOAD / 8, 0.5)])
-def test_exact_small_sphere_is_hertz(load, radius):
+@pytest.mark.parametrize("load", [LOAD, LOAD / 8])
+def test_exact_small_sphere_is_hertz(load, radius=0.5):
     """5, 6: The contact of a small sphere is that of half-spaces within 1 %; an eighth of the load halves its radius."""
     sphere = {"crown": {"radius": f"{radius} m", "across": f"{radius} m"}, "load": f"{load!r} N"}
     result = run(TITANIUM, sphere)
@@ -113,7 +117,8 @@ def test_exact_wide_flat_block_is_plane_strain(ratio=16):
     """7: The stiffnesses of a flat block 16 times as wide as tall are those of plane strain within 2 %."""
     wide = TITANIUM | {"width": f"{ratio * HEIGHT} m"}
     face = run(wide)
-    plane = {name: value for name, value in (BLOCK | wide).items() if name != "area"}
+    plane = BLOCK | wide
+    del plane["area"]
     expected = pf.run({"contact": plane}).measures
     for name in ("normal_stiffness", "tangential_stiffness"):
         assert face.measures[name].value == pytest.approx(expected[name].value, rel=0.02)

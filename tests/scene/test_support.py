@@ -137,7 +137,7 @@ CAUSES = [
     (RIG, f"structure.measured=stuck {GROOVES.format(load='contact')}", STUCK + "contact.grooves"),
     (POINT_RIG, f"structure.measured=stuck {GROOVES.format(load='normal')}", STUCK + "normal.grooves"),
     (POINT_RIG, f"structure.measured=stuck {SETS['normal.amplitude']}", STUCK + "normal.amplitude"),
-    (RIG, "structure.measured=stuck structure.mode.second.yaw=1_rad/m contact.strips.count=4",
+    (RIG, "structure.measured=stuck structure.mode.second.yaw=1_rad/m contact.area.cells=64",
      STUCK + "structure.mode[2].yaw"),
     (RIG, "structure.mode.second.gauge=0.3 structure.stiffening.cubic=1e10_N/m^3", "with structure.stiffening; give"),
     (RIG, "structure.mode.second.gauge=0.3 drive.kind=free drive.displacement=1_mm", "with drive.kind = 'free'; give"),

@@ -1,7 +1,5 @@
 """Contact points for tests of the march: laws from plain numbers, interfaces on modes, bonds, loads that change."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from patchfem.friction import Bonds
@@ -49,9 +47,8 @@ def make_bond_contact(bonds, force, row, shear=None, bond_sum=None, lower=None) 
     law = laws.make_bonds(bonds, loads) if bond_sum is None else laws.make_list(bonds, loads)
     if below:
         law = laws.keep_loads(law)
-    points = replace(PointSet(law, row, None, shear), bond_sum=bond_sum, **below)
-    limit = bonds.static * float(loads.sum())
-    return Contact([points], limit, bonds.length)
+    points = PointSet(law, row, None, shear, bond_sum=bond_sum, **below)
+    return Contact([points], bonds.static * float(loads.sum()), bonds.length)
 
 
 def make_pressed_contact(law, force, row, shear=None, bond_sum=None, **load) -> Contact:

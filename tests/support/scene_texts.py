@@ -56,6 +56,8 @@ slide = 1.0
 """
 KILOGRAM = MODE.replace("0.884 kg", "1 kg")
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 30\n'
+# The mode with much damping under three cycles of the drive.
+THREE_CYCLES = MODE.replace("0.003", "0.02") + DRIVE.replace("30", "3")
 
 # Keys for `make_shaken_block`.
 IWAN = 'law = "iwan"\nchi = -0.5\nbeta = 0.5\nstiffness = "20 kN/m"'

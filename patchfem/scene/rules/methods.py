@@ -216,16 +216,20 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     if kind != "rig":
         spring = find_nonlinear_spring(tables)
         return MotionFeatures([], "", False, spring, "", find_waveform(tables.drive), tables.drive)
+
+    # A table whose law could not be read has its own mistake
     tables_of_laws = [tables.friction, *(view.table for view in scene.structure.interface)]
     laws = [law for law in tables_of_laws if law is not None and law.law is not None]
-    load_change = find_load_change_key(tables) if laws else ""
+    joints = []
+    for law in laws:
+        joints.append(Joint(law, find_compliance_key(law, tables), _is_uneven(law, tables)))
+
+    # Shapes on the lower piece of the patch, or of the patches of interfaces
     lower = list_lower_shapes(tables.contact)
     for number, interface in enumerate(scene.structure.interface):
         patch_key = f"structure.interface.{number}.contact"
         lower += list_lower_shapes(interface.table.contact, patch_key)
-    joints = []
-    for law in laws:
-        joints.append(Joint(law, find_compliance_key(law, tables), _is_uneven(law, tables)))
+    load_change = find_load_change_key(tables) if laws else ""
     return MotionFeatures(
         joints=joints,
         load_change=load_change and f"with {describe_load_change(load_change)}",

@@ -114,8 +114,10 @@ class Joint(TableFacts):
     def opposite_shape(self) -> str:
         """Key of a shape on another piece than the shapes before it, the last one that is written; "" for none."""
         shapes = self.contact.table.shapes if self.contact else {}
-        placed = {name: shape.on for name, shape in shapes.items() if shape.on}
-        sides = {f"{self.patch_key}.{name}.on": side for name, side in placed.items()}
+        sides = {}
+        for name, shape in shapes.items():
+            if shape.on:
+                sides[f"{self.patch_key}.{name}.on"] = shape.on
         if len(set(sides.values())) < 2:
             return ""
         return next(filter(self.draft.has, reversed(sides)), next(iter(sides)))
@@ -220,7 +222,7 @@ JOINT_FEATURES = {
         lambda j: j.lower_shape, "{lower_shape}", "a shape on the lower piece"
     ),
     "patch without a face": Feature(
-        lambda j: not (j.contact and j.contact.area), "", "a patch without [contact.area]"
+        lambda j: not (j.contact and j.contact.area), "", "a joint without [contact.area]"
     ),
     "shapes on different pieces": Feature(
         lambda j: j.opposite_shape, "{opposite_shape}", "a shape on each piece"
@@ -229,7 +231,9 @@ JOINT_FEATURES = {
         lambda j: (
             j.law in LAWS
             and not (law_supports(j.table, "pieces") and law_supports(j.table, "shear"))
-        )
+        ),
+        "",
+        "law '{law}'",
     ),
     "mode with yaw": Feature(lambda j: j.yaw, "{yaw}"),
     "grooves": Feature(lambda j: not j.is_interface and j.grooves, "contact.grooves", "{grooves}"),

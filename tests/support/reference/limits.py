@@ -158,8 +158,6 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
 METHOD_COLUMNS = tuple(
     SceneColumn(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS
 )
-# Each law runs with each of these scenes.
-TABLES = {"Laws in a rig": (*RIGS, *MORE), "Laws on a bench": BENCHES}
 LAWS_TEXT = """\
 Every friction law runs with every effect, in a rig and on a bench: partial slip of elastic pieces, pressure over a face,
 bands that yaw, shapes on either piece, a load that oscillates, heave and pitch, grooves, nonlinear springs, several
@@ -171,9 +169,8 @@ nonlocal with another `order` than 1 or with reading 'report', and a motion that
 
 def text() -> str:
     """Return the page patchfem/scene/LIMITS.md; scenes are assembled and checked, but not run."""
-    refused = [row for columns in TABLES.values() for row in find_refusals(columns)]
-    if refused:
-        raise ValueError(f"a law is refused with an effect: {refused}")
+    if refused := find_refusals((*RIGS, *MORE, *BENCHES)):
+        raise ValueError(f"a law is refused with an effect: {list(refused)}")
     body = [
         "## Laws",
         LAWS_TEXT.strip(),
@@ -201,18 +198,18 @@ def text() -> str:
 
 
 def format_messages() -> str:
-    """Return the page of the messages with which the scenes of the tables of limits are refused."""
+    """Return the page of the messages with which methods refuse laws."""
+    rows = [
+        (law, words, "; ".join(sentences))
+        for (law, words), sentences in find_refusals(METHOD_COLUMNS).items()
+    ]
     parts = [
         "# Messages of unsupported combinations",
         "[Limits](../../../patchfem/scene/LIMITS.md) lists what is refused. The table below gives the message for each "
         "law that a method refuses.",
+        "## Methods",
+        format_table(("law", "with", "message"), rows),
     ]
-    for title, columns in (("Methods", METHOD_COLUMNS),):
-        rows = [
-            (law, words, "; ".join(sentences))
-            for (law, words), sentences in find_refusals(columns).items()
-        ]
-        parts += [f"## {title}", format_table(("law", "with", "message"), rows)]
     return "\n\n".join(parts) + "\n"
 
 
