@@ -13,10 +13,11 @@ from .. import __version__
 from ..campaigns.fits.curve import CURVE_EXTENSION_RATIO, FITTED_NAMES, CurveComparison
 from ..campaigns.fits.loop import LoopComparison
 from ..campaigns.fits.options import FitOptions
-from ..campaigns.fits.problem import FittedKeys, Listener, parse_ranges
+from ..campaigns.fits.problem import FittedKeys, Listener
 from ..campaigns.fits.request import fit_measurement
 from ..campaigns.fits.rows import RowsComparison
 from ..campaigns.fits.wear import DepthComparison
+from ..campaigns.free_keys import parse_ranges
 from ..disk.atomic_write import write_text
 from ..formatting import format_length, format_number
 from ..model.model import build, write_resolved

@@ -23,6 +23,7 @@ from rungs import (
     TABLE,
 )
 
+from patchfem.campaigns.held_out import select_held_out
 from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N
@@ -90,7 +91,7 @@ def training(cells, protocol: str) -> np.ndarray:
     if protocol == "all":
         return np.ones(cells.row.size, bool)
     held = PREDICTED_ROWS if protocol == "143" else f"frequency={protocol.split()[1]} Hz"
-    return ~cells.select_readings(held)
+    return ~select_held_out(held, cells.path, cells.columns)
 
 
 def stuck_gain(cells, seen) -> float:

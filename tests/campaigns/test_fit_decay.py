@@ -14,7 +14,7 @@ from scene_texts import (
 
 import patchfem as pf
 from patchfem.campaigns.fits.curve import CurveComparison
-from patchfem.campaigns.fits.problem import parse_ranges
+from patchfem.campaigns.free_keys import parse_ranges
 from patchfem.core import PatchfemError
 
 IWAN = (

@@ -23,7 +23,8 @@ from ...runs.wear import evolve
 from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
 from ...scene.scene import Scene
-from .problem import Comparison, FittedKeys, FreeKeys
+from ..free_keys import FreeKeys
+from .problem import Comparison, FittedKeys
 
 MAX_WORN_DEPTH_NAME = "worn_depth_max"
 # Names of the wear depths in compare.json, the more accurate one first.

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...inputs.measured import MeasuredRow, read_table
-from ..fits.held_out import EQUAL_NUMBERS_TOL, select_held_out
+from ..held_out import EQUAL_NUMBERS_TOL
 
 # Lower limit of a displacement [m] in a log ratio: the resolution of the printed table, 0.01 mil.
 MIN_COMPARED_DISPLACEMENT = 0.01 * 25.4e-6
@@ -68,14 +68,6 @@ class Readings:
         for name in ("frequency", "input", "flag"):
             columns[name] = [getattr(self.rows[k], name) for k in self.row]
         return columns
-
-    def select_readings(self, selector: str) -> np.ndarray:
-        """Return a mask (n,) of the readings whose row matches a selector "column=value,value".
-
-        Examples are "frequency=135 Hz,150 Hz" and "run=143 Hz repeat". Raises PatchfemError for a
-        value without a unit, and for a value that no row has.
-        """
-        return select_held_out(selector, self.path, self.columns)
 
     def select_computed(self, acceleration, displacement) -> np.ndarray:
         """Return the computed value (n,) of each reading.

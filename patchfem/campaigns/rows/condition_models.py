@@ -11,7 +11,7 @@ from ...effects import find_waveform
 from ...model.model import Model, build
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError, add_sets
-from ..fits.problem import FreeKeys
+from ..free_keys import FreeKeys
 
 # Scene keys of instrument gains, which scale the readings but do not change the motion.
 GAIN_KEYS = ("measured.acceleration_gain", "measured.displacement_gain")

@@ -9,7 +9,7 @@ from ...model.source import locate_errors
 from ...response.spectrum import read_instrument
 from ...runs.batch.motion_observer import MotionObserver
 from ...runs.joint import solve_without_joint
-from ..fits.problem import solve_contact
+from ..free_keys import solve_contact
 from .condition_models import GAIN_KEYS, ConditionModels
 
 
