@@ -311,7 +311,7 @@ def _require_enough_values(comparison: Comparison, count: int) -> None:
     if comparison.interval_kind != IntervalKind.KNOWN and count <= n:
         raise PatchfemError(
             f"{comparison.path}: only {count} {comparison.values_name} are used for the fit (what is held out does not "
-            f"count), too few to determine {n} values and their intervals"
+            f"count), too few to determine {n} values and their intervals; fit fewer keys, or add rows"
         )
 
 

@@ -150,6 +150,7 @@ class DepthComparison(Comparison):
                 f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example "
                 f"{COEFFICIENT_KEY}=1e-16 m^2/N..1e-12 m^2/N"
             )
+        self.n_runs = 0
         self.depth = depth = read_measured_depth(path)
         super().__init__(FreeKeys(scene, ranges), depth.source, np.array([depth.value]), {})
 
@@ -183,6 +184,7 @@ class DepthComparison(Comparison):
 
     def _compute_curve(self, coefficient: float) -> np.ndarray:
         """Compute coefficients [m2/N] up to a given one, and the depths [m] with them (2, j), from the course of one run."""
+        self.n_runs += 1
         model = self.keys.build_model([coefficient])
         worn = evolve.compute_wear(model, self.patch, (None, None), self.listener.progress)
         if worn.stopped:
@@ -220,6 +222,7 @@ class DepthComparison(Comparison):
         That is the distance of the depth of a run, whose meshes may be finer than those of the fit, and its error.
         """
         self.error = None
+        self.n_runs += 1
         try:
             measures = run(self.keys.build_model(values), progress=self.listener.progress).measures
         except (NotConverged, Missing):
