@@ -260,8 +260,8 @@ class CurveComparison(Comparison):
         ends = self.amplitude[[0, -1]] * [1 / CURVE_EXTENSION_RATIO, CURVE_EXTENSION_RATIO]
         amplitudes = np.geomspace(*ends, N_CURVE_POINTS)
 
-        def compute(values) -> np.ndarray:
-            """Return frequency [Hz] and damping ratio (2, j) for values of the parameters."""
+        def compute(values: np.ndarray) -> np.ndarray:
+            """Compute the curve (2, j), of frequency [Hz] and damping ratio, for values (n,) [SI] of the keys."""
             return compute_points(self.keys.build_model(values), amplitudes, self.method)
 
         half_widths = np.ptp(fit.intervals.ends, axis=1) / 2
