@@ -71,11 +71,11 @@ class Comparison(ABC):
 
     # Number of starting points of a search unless the user gives it.
     default_starts = 3
-    # Told the progress.
+    # Callbacks that report the progress of the fit.
     listener = SILENT_LISTENER
     # What the values are called in messages.
     values_name = "rows"
-    # Whether evaluations are so expensive that the first descents are quick.
+    # Whether an evaluation is so expensive that only the last descent has a tight tolerance.
     is_expensive = False
     interval_kind = IntervalKind.ROWS
 

@@ -44,7 +44,6 @@ class RowsComparison(Comparison):
         self.cells = read_response_table(path)
         models = ConditionModels(scene, self.cells.conditions, ranges, Path(path))
         super().__init__(models, path, self.cells.measured, self.cells.columns)
-        self.instrument = models.instrument
         self.warnings += models.notes
         self.readings = ModelReadings(models)
         self.forget_motions = self.readings.reset_motions

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
+from scipy.special import stdtrit
 
 from ...core import Missing, NotConverged, PatchfemError
 from ...formatting import format_length
@@ -34,9 +35,9 @@ COMMON_PART_NAMES = {"common_length", "common_area"}
 # Largest relative difference of computed and measured depth, over the tolerance, at which the search ends.
 MAX_DEPTH_ERROR_OVER_TOLERANCE = 0.1
 # Standard deviation of a depth that is given without an interval, relative to the depth; it keeps its weight finite
-MIN_RELATIVE_DEVIATION = 1e-9
+MIN_DEPTH_DEVIATION_RATIO = 1e-9
 # Half-width of a 95 % interval in standard deviations
-HALF_WIDTH = 1.96
+HALF_WIDTH = stdtrit(np.inf, 0.975)
 # Scene key of the wear coefficient [m2/N], the only one that is fitted to a wear depth
 COEFFICIENT_KEY = "wear.coefficient"
 
@@ -203,7 +204,9 @@ class DepthComparison(Comparison):
     def compare(self, computed: np.ndarray) -> np.ndarray:
         """Return the distance (1,) from the measured depth, in standard deviations of the interval on this side."""
         end = np.where(computed < self.measured, self.depth.low, self.depth.high)
-        half_width = np.maximum(np.abs(end - self.measured), MIN_RELATIVE_DEVIATION * self.measured)
+        half_width = np.maximum(
+            np.abs(end - self.measured), MIN_DEPTH_DEVIATION_RATIO * self.measured
+        )
         return HALF_WIDTH * (computed - self.measured) / half_width
 
     def refine(self, values: np.ndarray, training: np.ndarray) -> bool:

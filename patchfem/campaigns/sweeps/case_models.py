@@ -176,7 +176,7 @@ class SweepScene:
         return sha256(json.dumps(shared, sort_keys=True, default=str).encode()).hexdigest()
 
     def has_shared_meshes(self, keys: Sequence[str]) -> bool:
-        """Return whether the cases may have a mesh that is chosen for all of them together, which those of a rig have not.
+        """Return whether the cases may have one mesh that is chosen for all of them; each case of a rig has its own.
 
         `keys` are the swept keys.
         """

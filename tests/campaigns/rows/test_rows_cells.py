@@ -43,7 +43,7 @@ def test_exact_repeated_conditions_are_separate_readings(tmp_path):
     )
     assert cells.condition.tolist() == [0, 0, 0, 1] and cells.row.tolist() == [0, 0, 1, 3]
     assert cells.conditions.tolist() == [[143.0, 4 * G_N], [143.0, 5 * G_N]]
-    logs = cells.compute_log_ratios([4.5 * G_N, np.inf], [0.2 * MIL, 1.0])
+    logs = cells.compute_logs(cells.select_computed([4.5 * G_N, np.inf], [0.2 * MIL, 1.0]))
     assert logs == pytest.approx(
         [np.log(0.9), np.log(2), np.log(4.5 / 4), MAX_LOG_RATIO], rel=1e-14
     )
