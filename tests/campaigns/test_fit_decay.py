@@ -6,6 +6,7 @@ import xarray as xr
 from command_line import read_page, run_cli, run_successfully
 from page_data import find_accessibility_errors
 from scene_texts import (
+    COULOMB,
     DRIVE,
     KILOGRAM,
     POINT,
@@ -28,9 +29,9 @@ AMPLITUDES = np.geomspace(1e-6, 2e-5, 2)
 FREE = {"friction.stiffness": ("3e5 N/m", "3e6 N/m"), "friction.chi": (-0.9, -0.05)}
 
 
-def read_curve(path) -> CurveComparison:
-    """Return the comparison of a measured curve with the Iwan joint."""
-    return CurveComparison(pf.load(IWAN), path, parse_ranges(["friction.chi=-0.9..-0.05"]))
+def read_curve(path, scene=IWAN, free="friction.chi=-0.9..-0.05") -> CurveComparison:
+    """Return the comparison of a measured curve with a joint, by default an Iwan joint."""
+    return CurveComparison(pf.load(scene), path, parse_ranges([free]))
 
 
 def write_decay(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLITUDES):
@@ -192,6 +193,16 @@ def test_exact_damping_in_percent_and_assumed_errors(tmp_path):
     deviation = curve.estimate_deviation(curve.measured * [1.01, 1.01, 1.1, 1.1], every)
     assert deviation[:2] == pytest.approx(0.01 * curve.measured[:2], rel=1e-3)
     assert deviation[2:] == pytest.approx(curve.deviation[2:])
+
+
+def test_refuses_amplitude_at_which_rigid_friction_stops_the_mode(tmp_path):
+    """An amplitude at which the mode does not oscillate is named, with what to do."""
+    path = tmp_path / "curve.csv"
+    path.write_text("amplitude [um],frequency [Hz],damping\n1,143,0.1\n10000,143,0.005\n")
+    curve = read_curve(path, POINT + COULOMB + KILOGRAM + DRIVE, "friction.static=0.1..0.6")
+    curve.method = "balance"
+    with pytest.raises(PatchfemError, match="not oscillate at 1 of 2 amplitudes, at 1 um; leave"):
+        curve.compute([0.3])
 
 
 def test_refuses_fewer_values_than_parameters(tmp_path):
