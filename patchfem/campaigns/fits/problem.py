@@ -310,8 +310,8 @@ def _require_enough_values(comparison: Comparison, count: int) -> None:
     n = len(comparison.keys.ranges)
     if comparison.interval_kind != IntervalKind.KNOWN and count <= n:
         raise PatchfemError(
-            f"{comparison.path}: only {count} {comparison.values_name} are used for the fit (what is held out does not "
-            f"count), too few to determine {n} values and their intervals; fit fewer keys, or add rows"
+            f"{comparison.path}: only {count} {comparison.values_name} are used for the fit, without those held out, "
+            f"but it needs more than {n} to determine the keys and their intervals; fit fewer keys, or hold out fewer rows"
         )
 
 
