@@ -34,6 +34,7 @@ HERE = Path(__file__).parents[1]
 SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")
 # modules that run one scene repeatedly with other values of its keys
 SCENE_ALSO = (
+    "campaigns.free_keys",  # a scene with other values of its keys
     "campaigns.fits.*",  # a scene with other values of its keys or with another patch
     "export.fits",  # it writes the fitted scene
     "campaigns.sweeps.case_models",

@@ -1,6 +1,6 @@
 """Studies with many runs of a scene: fits, error against cost, wear comparisons, sweeps.
 
-Read `cost` first.
+Read `cost` first. Fits need `free_keys`, `held_out`, `rows` and `fits`, in this order.
 """
 
 # Names that other folders use, by the module that defines them.

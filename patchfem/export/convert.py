@@ -153,9 +153,10 @@ def view_results(
 
 
 def _open_window(frames: Frames, number: int, title: str) -> None:
-    """Open a window with the von Mises stress in both pieces, or with the pressure over a face.
+    """Show a frame in a window: the von Mises stress in both pieces, or the pressure over a face.
 
-    `number` is the index of the frame to show, and `title` that of the window. Missing is raised if there is no screen.
+    `number` is the index of the frame, and `title` is shown after the name of the program. Raises Missing if there is no
+    screen.
     """
     has_screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform.startswith("linux") and not has_screen:
@@ -166,8 +167,7 @@ def _open_window(frames: Frames, number: int, title: str) -> None:
     import pyvista as pv
 
     plotter = pv.Plotter(title=f"patchfem: {title}")
-    blocks = grids.select_shown_blocks(frames)
-    for grid in grids.make_grids(blocks, number, float(frames.times[number])):
+    for grid in grids.make_grids(grids.select_shown_blocks(frames), number):
         name = grid.active_scalars_name
         bar = {"title": f"{name.replace('_', ' ')} [{VTK_FIELDS[name].unit}]"}
         plotter.add_mesh(grid, scalar_bar_args=bar)

@@ -13,10 +13,11 @@ from .. import __version__
 from ..campaigns.fits.curve import CURVE_EXTENSION_RATIO, FITTED_NAMES, CurveComparison
 from ..campaigns.fits.loop import LoopComparison
 from ..campaigns.fits.options import FitOptions
-from ..campaigns.fits.problem import FittedKeys, Listener, parse_ranges
+from ..campaigns.fits.problem import FittedKeys, Listener
 from ..campaigns.fits.request import fit_measurement
 from ..campaigns.fits.rows import RowsComparison
 from ..campaigns.fits.wear import DepthComparison
+from ..campaigns.free_keys import parse_ranges
 from ..disk.atomic_write import write_text
 from ..formatting import format_length, format_number
 from ..model.model import build, write_resolved
@@ -263,7 +264,9 @@ def describe_curve_fit(fitted: FittedKeys) -> Parts:
         residual += " The errors of the measured values are their scatter around the fit."
     scores |= {name: Quantity(rms) for name, rms in fitted.score_predictions().items()}
     data = make_columns("row", columns) | make_columns("curve_amplitude", curve)
-    return Parts(residual, scores, data, {"method": comparison.method})
+    # a row of the table has two values
+    details = {"method": comparison.method, "rows": is_used.sum(), "held": (~is_used).sum()}
+    return Parts(residual, scores, data, details)
 
 
 def describe_rows_fit(fitted: FittedKeys) -> Parts:
@@ -284,6 +287,8 @@ def describe_rows_fit(fitted: FittedKeys) -> Parts:
     details = {
         "scores": all_scores,
         "scores_stable": comparison.compute_scores(fitted, only_stable=True),
+        "rms": search.rms,
+        "motions": comparison.readings.n_motions,
     }
     return Parts(residual, scores, _collect_rows(fitted), details)
 
@@ -348,7 +353,7 @@ def describe_wear_fit(fitted: FittedKeys) -> Parts:
     residual = f"The computed depth is {text}; it was measured as {format_length(depth.low)} to {format_length(depth.high)}."
     data = make_columns("point", points) | make_columns("curve_coefficient", curve)
     measured = comparison.path.name.replace("--to", depth.name)
-    details = {"measured": measured, "model_error": comparison.error}
+    details = {"measured": measured, "model_error": comparison.error, "runs": comparison.n_runs}
     return Parts(residual, scores, data, details)
 
 

@@ -126,7 +126,8 @@ QUANTITIES: dict[str, Definition] = {
     ),
     "left_out_rms": Definition(
         "1",
-        "the same of each row in the fit without it and the others with its value in this column",
+        "root mean square of predicted minus measured values, each predicted without its group of rows; of a curve in "
+        "standard deviations",
     ),
     "work_measured": Definition("J", "work of the measured force over the fitted rows"),
     "work_fitted": Definition("J", "work of the fitted force over the fitted rows"),

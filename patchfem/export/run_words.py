@@ -121,6 +121,7 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
             parts.append(part)
     if not parts:
         return ""
+
     # The onset in a drive of levels takes the place of other parts, that of no level has a longer sentence.
     onset = _describe_onset(result, measures)
     n_parts = MAX_HEADLINE_PARTS

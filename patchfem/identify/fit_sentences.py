@@ -1,5 +1,7 @@
 """Sentences about parameters that a fit does not determine, and about failures of its search."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..core import Outcome
@@ -10,7 +12,7 @@ from .least_squares import Fit
 MIN_SENSITIVITY = 1e-9
 
 
-def describe_fit(fit: Fit, names, bounds=()) -> list[str]:
+def describe_fit(fit: Fit, names: Sequence[str], bounds: Sequence[tuple[str, str]]) -> list[str]:
     """Return sentences about parameters that a fit does not determine, and failures of its search.
 
     The sentences report parameters that are at a bound, without effect, determined only in combination with
@@ -23,7 +25,7 @@ def describe_fit(fit: Fit, names, bounds=()) -> list[str]:
     names : sequence of str
         Names (n,) of the parameters.
     bounds : sequence of (str, str)
-        Low and high bound of each parameter with its unit.
+        Low and high bound (n,) of each parameter with its unit.
 
     Returns
     -------
@@ -46,15 +48,19 @@ def describe_fit(fit: Fit, names, bounds=()) -> list[str]:
     for i, name in enumerate(names):
         if np.isfinite(intervals.ends[i]).all():
             if intervals.open_ends[i].any() and not fit.at_bound[i]:
-                side = "low" if intervals.open_ends[i, 0] else "high"
-                sentences.append(f"{name}: the data do not exclude its {side} bound")
+                side = int(intervals.open_ends[i, 1])
+                sentences.append(
+                    f"{name}: the data do not exclude its {('low', 'high')[side]} bound {bounds[i][side]}, at which its "
+                    "interval ends: widen the range"
+                )
         elif intervals.sensitivity[i] <= min_sensitivity:
             sentences.append(
                 f"{name} has no effect on the computed data, so its value is not determined"
             )
         elif not in_combination[i]:
             sentences.append(
-                f"{name} is not determined: its interval of 95 % reaches both ends of its range"
+                f"{name} is not determined: its interval of 95 % reaches both ends of its range; widen it, or set the value "
+                "in the scene and do not fit it"
             )
 
     if fit.counts.failures:

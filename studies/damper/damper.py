@@ -25,8 +25,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 
 from steady_loops import HOLD, write_with_run_in
 
-from patchfem.campaigns.fits.problem import FittedKeys, parse_ranges
+from patchfem.campaigns.fits.problem import FittedKeys
 from patchfem.campaigns.fits.request import FitOptions, fit_measurement
+from patchfem.campaigns.free_keys import parse_ranges
 from patchfem.inputs import read_loop
 from patchfem.inputs.loops import Loop
 from patchfem.scene import loads

@@ -34,8 +34,8 @@ from steady_loops import HOLD, write_with_run_in
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.campaigns.fits.problem import parse_ranges
 from patchfem.campaigns.fits.request import FitOptions, fit_measurement
+from patchfem.campaigns.free_keys import parse_ranges
 from patchfem.scene import loads
 
 FOLDER = Path(__file__).parent

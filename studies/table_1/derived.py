@@ -135,6 +135,6 @@ class Worn(ModelReadings):
             static = first * max(1 + (values[-1] - 1) * depth / DEPTH, 0.05)
             found |= super()._compute_readings([static, *values[1:]], [row])
             swing = found[row][1]
-            cycles = self.models.sine_drive(row).omega / (2 * pi) * 60 * MINUTES
+            cycles = self.models.rigs[row].drive.signal.omega / (2 * pi) * 60 * MINUTES
             depth += COEFFICIENT * load / AREA * 4 * max(min(swing, 1e-3) - BOND, 0.0) * cycles
         return found

@@ -23,6 +23,7 @@ from rungs import (
     TABLE,
 )
 
+from patchfem.campaigns.held_out import select_held_out
 from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N
@@ -58,19 +59,17 @@ def make_residual(cells, computed: ModelReadings, seen):
 
     Parameters
     ----------
-    cells : Cells
+    cells : Readings
+        Measured readings (n,).
     computed : ModelReadings
+        Readings of the model.
     seen : (n,) array of bool
         Readings that are fitted.
-
-    Returns
-    -------
-    Callable
     """
     conditions = sorted(set(cells.condition[seen].tolist()))
 
     def residual(values) -> np.ndarray:
-        logs = cells.compute_log_ratios(*computed(values, conditions))
+        logs = cells.compute_logs(cells.select_computed(*computed(values, conditions)))
         return np.where(cells.unstable, np.minimum(logs, 0.0), logs)[seen]
 
     return residual
@@ -90,7 +89,7 @@ def training(cells, protocol: str) -> np.ndarray:
     if protocol == "all":
         return np.ones(cells.row.size, bool)
     held = PREDICTED_ROWS if protocol == "143" else f"frequency={protocol.split()[1]} Hz"
-    return ~cells.select_readings(held)
+    return ~select_held_out(held, cells.path, cells.columns)
 
 
 def stuck_gain(cells, seen) -> float:
@@ -162,7 +161,7 @@ def fit_rung(
     )
     computed.reset_motions()
     answer = np.array(computed(values, range(len(cells.conditions))))
-    logs = cells.compute_log_ratios(*answer)
+    logs = cells.compute_logs(cells.select_computed(*answer))
     return {
         "rung": rung,
         "reading": reading,
@@ -320,7 +319,9 @@ def group_valleys(cells, computed, seen, last, ends) -> tuple:
         elif rms(here - least) >= VALLEY_DISTANCE and all(
             rms(here - other) >= VALLEY_DISTANCE for other, _ in valleys
         ):
-            logs = cells.compute_log_ratios(*computed(values, range(len(cells.conditions))))
+            logs = cells.compute_logs(
+                cells.select_computed(*computed(values, range(len(cells.conditions))))
+            )
             valleys.append(
                 (here, [score, *(compute_rms_scores(cells, logs, ~seen) or {}).values()])
             )

@@ -58,7 +58,9 @@ def main(cycles: float = 800, models=("coulomb", "patch")) -> dict:
     out = {
         "null": compute_rms_scores(
             cells,
-            cells.compute_log_ratios(NULL * cells.conditions[:, 1], 0 * cells.conditions[:, 1]),
+            cells.compute_logs(
+                cells.select_computed(NULL * cells.conditions[:, 1], 0 * cells.conditions[:, 1])
+            ),
             every,
         )["acceleration"]
     }
@@ -67,7 +69,7 @@ def main(cycles: float = 800, models=("coulomb", "patch")) -> dict:
         both = np.array([[run[measure].value for run in runs] for measure in MEASURES])
         out[name] = {
             "cells": both,
-            **compute_rms_scores(cells, cells.compute_log_ratios(*both), every),
+            **compute_rms_scores(cells, cells.compute_logs(cells.select_computed(*both)), every),
         }
         print(
             f"{name}: all {out[name]['all']:.2f}, accelerations {out[name]['acceleration']:.2f}, displacements "

@@ -10,10 +10,10 @@ from friction_loops import dahl_force, elastic_plastic_force, write_loop
 from scene_texts import CROWNED_JOINT
 
 from patchfem import FitOptions, SceneError, build
-from patchfem.campaigns.fits.held_out import select_held_out
 from patchfem.campaigns.fits.loop import LoopComparison
-from patchfem.campaigns.fits.problem import parse_ranges
 from patchfem.campaigns.fits.request import fit_measurement
+from patchfem.campaigns.free_keys import parse_ranges
+from patchfem.campaigns.held_out import select_held_out
 from patchfem.core import PatchfemError
 from patchfem.export.fits import format_fitted_scene
 from patchfem.inputs import read_loop

@@ -6,6 +6,7 @@ import xarray as xr
 from command_line import read_page, run_cli, run_successfully
 from page_data import find_accessibility_errors
 from scene_texts import (
+    COULOMB,
     DRIVE,
     KILOGRAM,
     POINT,
@@ -14,7 +15,7 @@ from scene_texts import (
 
 import patchfem as pf
 from patchfem.campaigns.fits.curve import CurveComparison
-from patchfem.campaigns.fits.problem import parse_ranges
+from patchfem.campaigns.free_keys import parse_ranges
 from patchfem.core import PatchfemError
 
 IWAN = (
@@ -28,9 +29,9 @@ AMPLITUDES = np.geomspace(1e-6, 2e-5, 2)
 FREE = {"friction.stiffness": ("3e5 N/m", "3e6 N/m"), "friction.chi": (-0.9, -0.05)}
 
 
-def read_curve(path) -> CurveComparison:
-    """Return the comparison of a measured curve with the Iwan joint."""
-    return CurveComparison(pf.load(IWAN), path, parse_ranges(["friction.chi=-0.9..-0.05"]))
+def read_curve(path, scene=IWAN, free="friction.chi=-0.9..-0.05") -> CurveComparison:
+    """Return the comparison of a measured curve with a joint, by default an Iwan joint."""
+    return CurveComparison(pf.load(scene), path, parse_ranges([free]))
 
 
 def write_decay(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLITUDES):
@@ -194,6 +195,16 @@ def test_exact_damping_in_percent_and_assumed_errors(tmp_path):
     assert deviation[2:] == pytest.approx(curve.deviation[2:])
 
 
+def test_refuses_amplitude_at_which_rigid_friction_stops_the_mode(tmp_path):
+    """An amplitude at which the mode does not oscillate is named, with what to do."""
+    path = tmp_path / "curve.csv"
+    path.write_text("amplitude [um],frequency [Hz],damping\n1,143,0.1\n10000,143,0.005\n")
+    curve = read_curve(path, POINT + COULOMB + KILOGRAM + DRIVE, "friction.static=0.1..0.6")
+    curve.method = "balance"
+    with pytest.raises(PatchfemError, match="not oscillate at 1 of 2 amplitudes, at 1 um; leave"):
+        curve.compute([0.3])
+
+
 def test_refuses_fewer_values_than_parameters(tmp_path):
     """Two amplitudes are refused for four parameters.
 
@@ -202,9 +213,7 @@ def test_refuses_fewer_values_than_parameters(tmp_path):
     path = tmp_path / "few.csv"
     path.write_text("amplitude [m],frequency [Hz],damping [1]\n1e-6,100,0.01\n2e-6,99,0.01\n")
     free = {**FREE, "friction.static": (0.1, 0.6), "friction.beta": (0.1, 2)}
-    with pytest.raises(
-        PatchfemError, match=r"only 4 values are used .* too few to determine 4 values"
-    ):
+    with pytest.raises(PatchfemError, match=r"only 4 values are used .* needs more than 4"):
         pf.fit(IWAN, to=path, free=free)
 
 

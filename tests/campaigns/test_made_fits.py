@@ -169,12 +169,12 @@ KINDS = {"loop": fit_loop, "curve": fit_backbone, "rows": fit_rows, "wear": fit_
     ids=KINDS,
 )
 def test_always_intervals_hold_with_noise(kind, seeds, tmp_path):
-    """At least 80 % of the intervals hold, fewer than 90 % by chance of few fits, and they are not far too wide."""
+    """At most one of ten intervals fails, besides one by chance of few fits, and the intervals are not far too wide."""
     rows = []
     for seed in seeds:
         rows += KINDS[kind](seed, np.random.default_rng(seed), tmp_path)
     assert len(rows) >= len(seeds)
-    assert np.mean([row.holds for row in rows]) >= 0.8
+    assert np.count_nonzero([not row.holds for row in rows]) <= 1 + len(rows) // 10
     distances = [row.true_error / row.error for row in rows]
     assert np.median(distances) > 0.15  # 0.34 for normal errors
 

@@ -12,6 +12,7 @@ RNG = np.random.default_rng(7)
 DESIGN = RNG.normal(size=(30, 3))
 NOISY = DESIGN @ [1.0, 2.0, -0.5] + 0.1 * RNG.normal(size=30)
 LINE = np.linspace(0, 1, 40)
+BOUNDS = [("low", "high")] * 4  # words for the bounds of up to four parameters
 
 
 def solve_linear(design, data):
@@ -56,10 +57,14 @@ def test_exact_linear_fit_has_closed_form_intervals():
     ends = exact.widen([change], [(-5, 5)] * 3).intervals.ends
     assert exact.rms == 0 and np.ptp(ends, axis=1) / 2 == pytest.approx(shift, abs=1e-8)
     wide = fit.widen([1e3 * change], [(-5, 5)] * 3)
-    assert np.isnan(wide.intervals.ends).all() and "both ends" in describe_fit(wide, "abc")[0]
+    assert (
+        np.isnan(wide.intervals.ends).all() and "both ends" in describe_fit(wide, "abc", BOUNDS)[0]
+    )
     assert fit.at_bound == ("",) * 3
     assert fit.intervals.unknown.shape == (0, 3)
-    assert fit.outcome is Outcome.DONE and fit.n_best == 3 and describe_fit(fit, "abc") == []
+    assert (
+        fit.outcome is Outcome.DONE and fit.n_best == 3 and describe_fit(fit, "abc", BOUNDS) == []
+    )
 
 
 def test_exact_value_at_bound_has_profile_interval():
@@ -130,7 +135,7 @@ def test_exact_undetermined_product_is_reported(power, end):
         np.array([[1, 1 / power, 0, 0]]), abs=1e-6
     )
     assert fit.intervals.unknown[0, 0] * fit.intervals.unknown[0, 1] < 0
-    product, flat = describe_fit(fit, "abcd")
+    product, flat = describe_fit(fit, "abcd", BOUNDS)
     assert "a and b cannot be determined separately" in product and product.endswith(end)
     assert flat == "d has no effect on the computed data, so its value is not determined"
 
@@ -140,13 +145,13 @@ def test_exact_undetermined_value_has_no_interval():
     data = RNG.normal(size=20)
     fit = Problem(lambda v: v[0] - data + 1e-3 * v[1], [-5, 0], [5, 1]).solve()
     second_fit = Problem(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1]).solve()
-    assert "cannot be determined separately" in describe_fit(fit, "ab")[0]
+    assert "cannot be determined separately" in describe_fit(fit, "ab", BOUNDS)[0]
     assert (
         np.isnan(second_fit.intervals.ends[1]).all() and second_fit.intervals.methods[1] == "none"
     )
     assert (
-        "b is not determined: its interval of 95 % reaches both ends of its range"
-        in describe_fit(second_fit, "ab")
+        "b is not determined: its interval of 95 % reaches both ends of its range; widen it, or set the value in the scene "
+        "and do not fit it" in describe_fit(second_fit, "ab", BOUNDS)
     )
 
 
@@ -191,7 +196,7 @@ def test_always_failed_evaluations_are_counted():
     assert fit.counts.reason in ("too long", "the residual is not finite")
     assert (
         f"{fit.counts.failures} of {fit.counts.evaluations} evaluations failed"
-        in describe_fit(fit, "a")[-1]
+        in describe_fit(fit, "a", BOUNDS)[-1]
     )
 
 

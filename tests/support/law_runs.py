@@ -5,8 +5,8 @@ import csv
 import numpy as np
 from scene_texts import DRIVE, MODE
 
-from patchfem.campaigns.fits.problem import parse_ranges
 from patchfem.campaigns.fits.request import fit_measurement
+from patchfem.campaigns.free_keys import parse_ranges
 from patchfem.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run

@@ -58,7 +58,8 @@ def make_curve(amplitude, values, errors) -> Curve:
     The rows are frequency [Hz], damping ratio, loss [J], force [N] and, if it differs, the frequency of the force [Hz].
     """
     frequency, damping, loss, force, *forced = values
-    errors = (errors[0], errors[1], errors[3])
+    frequency_error, damping_error, _, force_error, *_ = errors
+    errors = (frequency_error, damping_error, force_error)
     return Curve(amplitude, frequency, damping, force, *errors, loss, *(forced or [frequency]))
 
 

@@ -22,7 +22,8 @@ from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
 from ..backbone.records import CURVE_METHODS
 from ..backbone.words import describe_span
-from .problem import Comparison, FittedKeys, FreeKeys
+from ..free_keys import FreeKeys
+from .problem import Comparison, FittedKeys
 
 # Factors to SI by unit, for each column of a measured curve
 CURVE_UNITS = {
@@ -120,6 +121,8 @@ class CurveComparison(Comparison):
         self.method = CURVE_METHODS[-1]
         self.reasons: dict[str, NotConverged] = {}
         self.n_reweightings = 0
+        # whether the intervals contain the numerical error of the curve
+        self.error_note = ""
 
     @property
     def _min_deviation(self) -> np.ndarray:
@@ -189,7 +192,7 @@ class CurveComparison(Comparison):
         try:
             error = compute_points(model, self.amplitude, self.method, errors=True)
         except PatchfemError as reason:
-            self.notes.append(
+            self.error_note = (
                 f"the intervals do not contain the numerical error of the curve: {reason}"
             )
             return np.zeros((0, self.measured.size))
@@ -197,7 +200,7 @@ class CurveComparison(Comparison):
         curve = self.compute(values).reshape(2, -1)
         relative = np.divide(error, np.abs(curve), out=np.zeros_like(error), where=curve != 0)
         frequency, damping = 100 * relative.max(axis=1)
-        self.notes.append(
+        self.error_note = (
             f"the intervals contain the numerical error of the curve, up to {frequency:.2g} % of the frequency and "
             f"{damping:.2g} % of the damping ratio"
         )
@@ -235,7 +238,7 @@ class CurveComparison(Comparison):
                 f"{100 * amplitude_loss:.2g} %. The intervals do not contain this difference; a run of a release computes "
                 "the decay"
             )
-        return notes
+        return [*notes, self.error_note]
 
     def extrapolate(self, fit) -> np.ndarray:
         """Compute the fitted curve with its band from below to beyond the measured amplitudes.
@@ -257,8 +260,8 @@ class CurveComparison(Comparison):
         ends = self.amplitude[[0, -1]] * [1 / CURVE_EXTENSION_RATIO, CURVE_EXTENSION_RATIO]
         amplitudes = np.geomspace(*ends, N_CURVE_POINTS)
 
-        def compute(values) -> np.ndarray:
-            """Return frequency [Hz] and damping ratio (2, j) for values of the parameters."""
+        def compute(values: np.ndarray) -> np.ndarray:
+            """Compute the curve (2, j), of frequency [Hz] and damping ratio, for values (n,) [SI] of the keys."""
             return compute_points(self.keys.build_model(values), amplitudes, self.method)
 
         half_widths = np.ptp(fit.intervals.ends, axis=1) / 2

@@ -23,7 +23,8 @@ from ...runs.bench.engine import choose_smooth_bond_summation
 from ...runs.patch.mesh_levels import solve_on_other_mesh
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
-from .problem import Comparison, FittedKeys, FreeKeys, solve_contact
+from ..free_keys import FreeKeys, solve_contact
+from .problem import Comparison, FittedKeys
 
 # Number of time steps between two rows at which the steps are not halved any more.
 MAX_STEPS_PER_ROW = 64

@@ -5,7 +5,8 @@ A kind of measurement derives a class from `Comparison`, which computes the meas
 numerical errors of the model, and predicts rows that are held out or left out.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -17,15 +18,10 @@ from ...identify.advice import advise_test
 from ...identify.fit_sentences import describe_fit
 from ...identify.intervals import IntervalKind
 from ...identify.least_squares import Fit, Problem
-from ...model.model import Model, build
 from ...model.rig import JOINT_TABLES
 from ...model.structure import name_joint_source
-from ...runs.patch import mesh_levels
-from ...scene.assignments import BOUNDS_FORM, Range, read_assignments
-from ...scene.lines import find_scene_value
-from ...scene.overrides import BaseScene
-from ...scene.scene import Scene, SceneError, add_sets
-from .held_out import group_by_column, select_held_out
+from ..free_keys import FreeKeys
+from ..held_out import group_by_column, select_held_out
 from .options import FitOptions
 
 # Largest number of refinements of a model in a fit; two to five suffice.
@@ -50,65 +46,7 @@ DEFAULT_OPTIONS = FitOptions()
 SILENT_LISTENER = Listener()
 
 
-class FreeKeys:
-    """Free keys of a scene, and the models of the scene with their values.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with the initial values.
-    ranges : sequence of Range
-        Bounds of the free keys.
-    sets : sequence of str
-        The ``table.key=value`` strings that are set for all values of the keys.
-    """
-
-    def __init__(self, scene: Scene, ranges: Sequence[Range], sets: Sequence[str] = ()):
-        self.scene = scene
-        self.ranges = list(ranges)
-        self.sets = list(sets)
-        self.base = BaseScene(add_sets(scene, self.sets))
-
-    def assign(self, values: Iterable[float]) -> list[str]:
-        """Return the ``table.key=value`` strings that set the keys to values (n,) [SI]."""
-        return [bound.format_assignment(value) for bound, value in zip(self.ranges, values)]
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the keys."""
-        return [bound.key for bound in self.ranges]
-
-    @property
-    def bounds(self) -> np.ndarray:
-        """Bounds (n, 2) of the keys [SI]."""
-        return np.array([(bound.low, bound.high) for bound in self.ranges])
-
-    @property
-    def changes_contact(self) -> bool:
-        """Whether a key changes the static contact solution."""
-        return any(name.startswith("contact.") for name in self.names)
-
-    def build_model(self, values: Iterable[float]) -> Model:
-        """Build the model of the scene with values (n,) [SI] of the keys.
-
-        Raises PatchfemError if the scene is invalid with them; a search counts this as a failed evaluation.
-        """
-        try:
-            return build(self.base.override(self.assign(values)))
-        except SceneError as error:
-            raise PatchfemError(error.mistakes[0]) from None
-
-    def start(self) -> list[float]:
-        """Return the values of the scene, clipped to their ranges; NaN for a key that the scene does not set."""
-        values = []
-        for bound in self.ranges:
-            _, value = find_scene_value(self.scene, bound.key)
-            known = value if isinstance(value, float) else np.nan
-            values.append(np.clip(known, bound.low, bound.high))
-        return values
-
-
-class Comparison:
+class Comparison(ABC):
     """Measured values (r,) beside those that the model of a scene computes.
 
     Attributes
@@ -125,17 +63,19 @@ class Comparison:
         Words for the place of each value, such as "at 143 Hz", if it can be measured again.
     interval_kind : str
         Assumption on the errors of the values.
-    warnings, notes : list of str
+    forget_motions : callable
+        Forgets earlier results, so that an evaluation does not depend on those before it.
+    warnings : list of str
         Sentences for the user on assumptions of the fit.
     """
 
     # Number of starting points of a search unless the user gives it.
     default_starts = 3
-    # Told the progress.
+    # Callbacks that report the progress of the fit.
     listener = SILENT_LISTENER
     # What the values are called in messages.
     values_name = "rows"
-    # Whether evaluations are so expensive that the first descents are quick.
+    # Whether an evaluation is so expensive that only the last descent has a tight tolerance.
     is_expensive = False
     interval_kind = IntervalKind.ROWS
 
@@ -146,19 +86,16 @@ class Comparison:
         self.deviation = np.ones(measured.shape)
         self.labels = labels
         self.places: list[str] = []
+        self.forget_motions: Callable[[], None] = lambda: None
         self.warnings: list[str] = []
-        self.notes: list[str] = []
 
+    @abstractmethod
     def compute(self, values: Sequence[float], needed: np.ndarray) -> np.ndarray:
         """Compute the measured values (r,) for values (n,) [SI] of the keys, those of a mask `needed` (r,) at least."""
-        raise NotImplementedError
 
     def compare(self, computed: np.ndarray) -> np.ndarray:
         """Return the residual (r,) of computed values (r,)."""
         return (computed - self.measured) / self.deviation
-
-    def forget_motions(self) -> None:
-        """Forget earlier results, so that an evaluation does not depend on those before it."""
 
     def refine(self, values: np.ndarray, training: np.ndarray) -> bool:
         """Refine the model around fitted values (n,), and return whether it has changed, so that the search goes on.
@@ -308,7 +245,7 @@ def fit_keys(
     return replace(
         fitted,
         warnings=_collect_warnings(fitted),
-        notes=[*comparison.find_notes(fitted), *comparison.notes, *_advise_repetition(fitted)],
+        notes=[*comparison.find_notes(fitted), *_advise_repetition(fitted)],
         seconds=perf_counter() - begin,
     )
 
@@ -373,8 +310,8 @@ def _require_enough_values(comparison: Comparison, count: int) -> None:
     n = len(comparison.keys.ranges)
     if comparison.interval_kind != IntervalKind.KNOWN and count <= n:
         raise PatchfemError(
-            f"{comparison.path}: only {count} {comparison.values_name} are used for the fit (what is held out does not "
-            f"count), too few to determine {n} values and their intervals"
+            f"{comparison.path}: only {count} {comparison.values_name} are used for the fit, without those held out, "
+            f"but it needs more than {n} to determine the keys and their intervals; fit fewer keys, or hold out fewer rows"
         )
 
 
@@ -406,23 +343,14 @@ def _advise_repetition(fitted: FittedKeys) -> list[str]:
     return [advice] if advice else []
 
 
-def parse_ranges(texts: Iterable[str]) -> list[Range]:
-    """Parse the ranges of free keys from "table.key=low..high" texts.
-
-    Raises SceneError with all validation errors.
-    """
-    ranges, mistakes = read_assignments(texts, BOUNDS_FORM)
-    if mistakes:
-        raise SceneError(mistakes)
-    return ranges
-
-
 def warn_of_bolted_joint(keys: FreeKeys) -> list[str]:
     """Return a list with a warning if a free key changes a joint that was bolted in the modal test, else []."""
     structure = keys.scene.structure
-    if structure is None or structure.measured == "free":
-        return []
-    if name_joint_source(structure) != "written":
+    if (
+        structure is None
+        or structure.measured == "free"
+        or name_joint_source(structure) != "written"
+    ):
         return []
     names = [name for name in keys.names if name.startswith(JOINT_TABLES)]
     if not names:
@@ -431,14 +359,3 @@ def warn_of_bolted_joint(keys: FreeKeys) -> list[str]:
         f"the joint of the scene as written is subtracted from the bolted modes for every value of {' and '.join(names)}; "
         'if the fitted joint is the one that was bolted in the modal test, set structure.measured_joint = "case"'
     ]
-
-
-def solve_contact(model: Model):
-    """Solve the static contact problem of a model without error estimates.
-
-    Raises PatchfemError if the surfaces do not touch.
-    """
-    patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
-    if patch.pressure.outcome is Outcome.NO_CONTACT:
-        raise PatchfemError(patch.pressure.outcome.sentence, "")
-    return patch

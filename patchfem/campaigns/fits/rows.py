@@ -44,9 +44,9 @@ class RowsComparison(Comparison):
         self.cells = read_response_table(path)
         models = ConditionModels(scene, self.cells.conditions, ranges, Path(path))
         super().__init__(models, path, self.cells.measured, self.cells.columns)
-        self.instrument = models.instrument
         self.warnings += models.notes
         self.readings = ModelReadings(models)
+        self.forget_motions = self.readings.reset_motions
         places = [f"at {f:.6g} Hz and {level / G_N:.4g} g" for f, level in self.cells.conditions]
         self.places = [places[k] for k in self.cells.condition]
 
@@ -60,10 +60,6 @@ class RowsComparison(Comparison):
         """Return the log ratios (n,), at most 0 for a reading flagged U."""
         logs = self.cells.compute_logs(computed)
         return np.where(self.cells.unstable, np.minimum(logs, 0.0), logs)
-
-    def forget_motions(self) -> None:
-        """Begin the next motions from rest."""
-        self.readings.reset_motions()
 
     def find_warnings(self, fitted: FittedKeys) -> list[str]:
         """Return warnings about rows without readings, unstable readings and an unreliable search."""

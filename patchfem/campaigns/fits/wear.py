@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
+from scipy.special import stdtrit
 
 from ...core import Missing, NotConverged, PatchfemError
 from ...formatting import format_length
@@ -23,7 +24,8 @@ from ...runs.wear import evolve
 from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
 from ...scene.scene import Scene
-from .problem import Comparison, FittedKeys, FreeKeys
+from ..free_keys import FreeKeys
+from .problem import Comparison, FittedKeys
 
 MAX_WORN_DEPTH_NAME = "worn_depth_max"
 # Names of the wear depths in compare.json, the more accurate one first.
@@ -33,9 +35,9 @@ COMMON_PART_NAMES = {"common_length", "common_area"}
 # Largest relative difference of computed and measured depth, over the tolerance, at which the search ends.
 MAX_DEPTH_ERROR_OVER_TOLERANCE = 0.1
 # Standard deviation of a depth that is given without an interval, relative to the depth; it keeps its weight finite
-MIN_RELATIVE_DEVIATION = 1e-9
+MIN_DEPTH_DEVIATION_RATIO = 1e-9
 # Half-width of a 95 % interval in standard deviations
-HALF_WIDTH = 1.96
+HALF_WIDTH = stdtrit(np.inf, 0.975)
 # Scene key of the wear coefficient [m2/N], the only one that is fitted to a wear depth
 COEFFICIENT_KEY = "wear.coefficient"
 
@@ -149,6 +151,7 @@ class DepthComparison(Comparison):
                 f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example "
                 f"{COEFFICIENT_KEY}=1e-16 m^2/N..1e-12 m^2/N"
             )
+        self.n_runs = 0
         self.depth = depth = read_measured_depth(path)
         super().__init__(FreeKeys(scene, ranges), depth.source, np.array([depth.value]), {})
 
@@ -182,6 +185,7 @@ class DepthComparison(Comparison):
 
     def _compute_curve(self, coefficient: float) -> np.ndarray:
         """Compute coefficients [m2/N] up to a given one, and the depths [m] with them (2, j), from the course of one run."""
+        self.n_runs += 1
         model = self.keys.build_model([coefficient])
         worn = evolve.compute_wear(model, self.patch, (None, None), self.listener.progress)
         if worn.stopped:
@@ -200,7 +204,9 @@ class DepthComparison(Comparison):
     def compare(self, computed: np.ndarray) -> np.ndarray:
         """Return the distance (1,) from the measured depth, in standard deviations of the interval on this side."""
         end = np.where(computed < self.measured, self.depth.low, self.depth.high)
-        half_width = np.maximum(np.abs(end - self.measured), MIN_RELATIVE_DEVIATION * self.measured)
+        half_width = np.maximum(
+            np.abs(end - self.measured), MIN_DEPTH_DEVIATION_RATIO * self.measured
+        )
         return HALF_WIDTH * (computed - self.measured) / half_width
 
     def refine(self, values: np.ndarray, training: np.ndarray) -> bool:
@@ -219,6 +225,7 @@ class DepthComparison(Comparison):
         That is the distance of the depth of a run, whose meshes may be finer than those of the fit, and its error.
         """
         self.error = None
+        self.n_runs += 1
         try:
             measures = run(self.keys.build_model(values), progress=self.listener.progress).measures
         except (NotConverged, Missing):

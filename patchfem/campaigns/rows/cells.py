@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...inputs.measured import MeasuredRow, read_table
-from ..fits.held_out import EQUAL_NUMBERS_TOL, select_held_out
+from ..held_out import EQUAL_NUMBERS_TOL
 
 # Lower limit of a displacement [m] in a log ratio: the resolution of the printed table, 0.01 mil.
 MIN_COMPARED_DISPLACEMENT = 0.01 * 25.4e-6
@@ -52,30 +52,22 @@ class Readings:
     condition: np.ndarray
 
     @property
-    def row_names(self) -> list[str]:
-        """Name of each row: its frequency, followed by "repeat" for a repeated measurement."""
-        return [f"{row.frequency:.6g} Hz" + " repeat" * ("R" in row.flag) for row in self.rows]
-
-    @property
     def empty_rows(self) -> list[int]:
         """Indices of the rows without any reading."""
         return sorted(set(range(len(self.rows))) - set(self.row.tolist()))
 
     @property
     def columns(self) -> dict[str, list[float | str]]:
-        """Columns by which rows can be selected: for each of the n readings the value in its row, and as "run" its name."""
-        columns = {"run": [self.row_names[k] for k in self.row]}
-        for name in ("frequency", "input", "flag"):
-            columns[name] = [getattr(self.rows[k], name) for k in self.row]
-        return columns
+        """Columns by which rows can be selected, with a cell for each of the n readings.
 
-    def select_readings(self, selector: str) -> np.ndarray:
-        """Return a mask (n,) of the readings whose row matches a selector "column=value,value".
-
-        Examples are "frequency=135 Hz,150 Hz" and "run=143 Hz repeat". Raises PatchfemError for a
-        value without a unit, and for a value that no row has.
+        The name of a row, in the column "run", is its frequency, followed by "repeat" for a repeated measurement.
         """
-        return select_held_out(selector, self.path, self.columns)
+        rows = [self.rows[k] for k in self.row]
+        names = [f"{row.frequency:.6g} Hz" + " repeat" * ("R" in row.flag) for row in rows]
+        columns = {"run": names}
+        for name in ("frequency", "input", "flag"):
+            columns[name] = [getattr(row, name) for row in rows]
+        return columns
 
     def select_computed(self, acceleration, displacement) -> np.ndarray:
         """Return the computed value (n,) of each reading.
@@ -98,10 +90,6 @@ class Readings:
             ratio = np.log(np.maximum(computed, lower_limit))
             ratio -= np.log(np.maximum(self.measured, lower_limit))
         return np.clip(ratio, -MAX_LOG_RATIO, MAX_LOG_RATIO)
-
-    def compute_log_ratios(self, acceleration, displacement) -> np.ndarray:
-        """Return the log ratios (n,) of accelerations [m s-2] and displacements [m] (c,) at the conditions."""
-        return self.compute_logs(self.select_computed(acceleration, displacement))
 
 
 def _number_values(values) -> np.ndarray:

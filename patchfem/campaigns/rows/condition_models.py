@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import PatchfemError, SineDrive
+from ...core import PatchfemError
 from ...effects import find_waveform
 from ...model.model import Model, build
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError, add_sets
-from ..fits.problem import FreeKeys
+from ..free_keys import FreeKeys
 
 # Scene keys of instrument gains, which scale the readings but do not change the motion.
 GAIN_KEYS = ("measured.acceleration_gain", "measured.displacement_gain")
@@ -66,7 +66,6 @@ class ConditionModels(FreeKeys):
         super().__init__(scene, ranges, sets)
         self.notes = notes
 
-        self.instrument = self.base.scene.measured
         self.model_parameters = [k for k, bound in enumerate(ranges) if bound.key not in GAIN_KEYS]
         # The rig under the drive of each measured condition.
         self.rigs = []
@@ -82,10 +81,6 @@ class ConditionModels(FreeKeys):
         drive = self.rigs[condition].drive
         rig = model.rig.with_signal(drive.signal, frequency=drive.frequency, cycles=drive.cycles)
         return replace(model, rig=rig)
-
-    def sine_drive(self, condition: int) -> SineDrive:
-        """Return the sinusoidal drive of a measured condition."""
-        return self.rigs[condition].drive.signal
 
 
 def _require_sines_of_base(scene: Scene, ranges: Sequence[Range], measured: Path) -> None:

@@ -9,7 +9,7 @@ from ...model.source import locate_errors
 from ...response.spectrum import read_instrument
 from ...runs.batch.motion_observer import MotionObserver
 from ...runs.joint import solve_without_joint
-from ..fits.problem import solve_contact
+from ..free_keys import solve_contact
 from .condition_models import GAIN_KEYS, ConditionModels
 
 
@@ -35,7 +35,7 @@ class ModelReadings:
         self.patch = None
         self.n_motions = 0
         self.reset_motions()
-        instrument = models.instrument
+        instrument = models.base.scene.measured
         self.reading = ("peak", None)
         self.gains = (1.0, 1.0)
         if instrument is not None:
@@ -49,14 +49,6 @@ class ModelReadings:
         self.last_motions: dict[int, object] = {}
         self.last_values: tuple[float, ...] = ()
         self.last_readings: dict[int, tuple[float, float]] = {}
-
-    def predict(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:
-        """Predict the readings (2, c) for values of the free keys with motions that start from rest.
-
-        `conditions` are the indices of those that are computed, and the others are NaN.
-        """
-        self.reset_motions()
-        return self(values, conditions)
 
     def __call__(self, values: Sequence[float], conditions: Iterable[int]) -> np.ndarray:
         """Return acceleration [m s-2] and displacement [m] readings (2, c) for values of the free keys.
@@ -98,7 +90,7 @@ class ModelReadings:
                     observer = MotionObserver(driven, patch, self.say, needs_cycle)
 
                 # a motion begins at the last one under the same drive; without a bounded one the readings are infinite
-                drive = self.models.sine_drive(k)
+                drive = self.models.rigs[k].drive.signal
                 motion = observer(drive, self.last_motions.get(k))
                 if motion is None:
                     self.last_motions.pop(k, None)

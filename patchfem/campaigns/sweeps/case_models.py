@@ -153,13 +153,15 @@ class SweepScene:
 
     def replace_mode_name(self, key: str) -> str:
         """Replace the name of a mode in a key by the index of the mode."""
-        pieces = key.split(".")
         modes = tomllib.loads(self.text).get("structure", {})
         modes = modes.get("mode") if isinstance(modes, dict) else None
-        if pieces[:2] == ["structure", "mode"] and len(pieces) > 2 and isinstance(modes, list):
+        names = []
+        if isinstance(modes, list):
             names = [mode.get("name") if isinstance(mode, dict) else None for mode in modes]
-            pieces[2] = str(names.index(pieces[2])) if pieces[2] in names else pieces[2]
-        return ".".join(pieces)
+        match key.split("."):
+            case ["structure", "mode", name, *rest] if name in names:
+                return ".".join(["structure", "mode", str(names.index(name)), *rest])
+        return key
 
     def hash_common_data(self) -> str:
         """Return a hash of all data that the cases of the sweep have in common.
@@ -174,7 +176,7 @@ class SweepScene:
         return sha256(json.dumps(shared, sort_keys=True, default=str).encode()).hexdigest()
 
     def has_shared_meshes(self, keys: Sequence[str]) -> bool:
-        """Return whether the cases may have a mesh that is chosen for all of them together, which those of a rig have not.
+        """Return whether the cases may have one mesh that is chosen for all of them; each case of a rig has its own.
 
         `keys` are the swept keys.
         """

@@ -105,14 +105,14 @@ def _find_vertex(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
 
     Without a vertex between the outer points it is the middle one.
     """
-    slopes = np.diff(y) / np.diff(x)
-    curvature = (slopes[1] - slopes[0]) / (x[2] - x[0])
+    left, middle, right = x.tolist()
+    slope, right_slope = (np.diff(y) / np.diff(x)).tolist()
+    curvature = (right_slope - slope) / (right - left)
     if curvature:
-        place = (x[0] + x[1]) / 2 - slopes[0] / (2 * curvature)
-        if x[0] <= place <= x[2]:
-            value = y[0] + (place - x[0]) * (slopes[0] + curvature * (place - x[1]))
-            return float(place), float(value)
-    return float(x[1]), float(y[1])
+        place = (left + middle) / 2 - slope / (2 * curvature)
+        if left <= place <= right:
+            return place, float(y[0] + (place - left) * (slope + curvature * (place - middle)))
+    return middle, float(y[1])
 
 
 def _find_interval(

@@ -134,23 +134,23 @@ def _group_models(
     for places in cases.split_into_groups(numbers, keys) if keys else ():
         if len(places) < MIN_SIMILAR_CASES:
             continue
+
+        # the case in the middle is the base, or else one at an end, if its scene is valid
         base = None
         for place in places[[len(places) // 2, 0, -1]].tolist():
             sets = cases.assignments(int(numbers[place]))
             base = base or work.sweep_scene.build_similar_base(keys, sets)
         if base is None or (base.model.patch is not None and base.model.kind != "patch"):
             continue
+
+        # cases whose numbers are not plain go to the last group
         model = work.meshes.with_shared_meshes(base.model)
         values = np.array([columns[key][places] for key in keys]).T
         is_plain = base.plain_numbers.are_plain(values)
         places = places[is_plain]
         is_single[places] = False
-        yield (
-            places,
-            SimilarModels(
-                base.plain_numbers, model, values[is_plain], cases.assignments, numbers[places]
-            ),
-        )
+        group = values[is_plain], cases.assignments, numbers[places]
+        yield places, SimilarModels(base.plain_numbers, model, *group)
 
     places = np.flatnonzero(is_single)
     if places.size:

@@ -84,9 +84,9 @@ def make_blocks(pieces: Pieces) -> dict[str, Block]:
 
 
 def make_face_blocks(result) -> dict[str, Block]:
-    """Return the cells of the face of a run with [contact.area] as the block of the interface.
+    """Return the face of a run with [contact.area] as a block of quadrilaterals, one per cell, named "interface".
 
-    Quadrilaterals serve the writer, the readers and the film of both pieces; image data would need others.
+    The writer and the readers of both pieces take such cells, but not the image data of a regular grid.
     """
     patch = result.patch
     rows, columns = patch.shape

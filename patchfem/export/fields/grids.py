@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import explain_mkdir_error, write_rows, write_text
-from .blocks import VTK_FIELDS, Block
+from .blocks import VTK_FIELDS
 from .vtkhdf import Frames, collect_frames, write_blocks
 
 if TYPE_CHECKING:
@@ -22,22 +22,22 @@ if TYPE_CHECKING:
 COLOURED_FIELDS = {"lower": "von_mises", "upper": "von_mises", "interface": "normal_stress"}
 
 
-def make_grids(blocks: dict[str, Block], number: int, time: float) -> MultiBlock:
-    """Return one frame of blocks as a pyvista.MultiBlock of named grids, in SI.
+def make_grids(frames: Frames, number: int) -> MultiBlock:
+    """Return one frame as a pyvista.MultiBlock with a grid per block, in SI units.
+
+    Each grid has the time [s] as its field array `TimeValue`.
 
     Parameters
     ----------
-    blocks : dict of str to Block
-        Parts and their fields.
+    frames : Frames
+        Fields of a run.
     number : int
         Number of the frame.
-    time : float
-        [s]; the field array `TimeValue` of every grid.
     """
     import pyvista as pv
 
     grids = pv.MultiBlock()
-    for part, block in blocks.items():
+    for part, block in frames.blocks.items():
         connectivity, starts, types = block.vtk_cells()
         cells = np.insert(connectivity, starts[:-1], np.diff(starts))
         grid = pv.UnstructuredGrid(cells, types, block.points)
@@ -47,7 +47,7 @@ def make_grids(blocks: dict[str, Block], number: int, time: float) -> MultiBlock
         ):
             for name, values in fields.items():
                 data[name] = values[number % len(values)]  # a constant field has one frame
-        grid.field_data["TimeValue"] = [time]
+        grid.field_data["TimeValue"] = [frames.times[number]]
         grid.set_active_scalars(COLOURED_FIELDS[part])
         _label_units(grid)
         grids.append(grid, part)
@@ -65,15 +65,15 @@ def _label_units(grid) -> None:
 
 
 def make_result_grids(result: Result, numbers: Iterable[int]) -> list[MultiBlock]:
-    """Return frames of a run with a patch as pyvista.MultiBlock objects, in SI."""
+    """Return frames of a run with a patch as pyvista.MultiBlock objects, in SI units."""
     frames = collect_frames(result)
-    return [make_grids(frames.blocks, number, float(frames.times[number])) for number in numbers]
+    return [make_grids(frames, number) for number in numbers]
 
 
 def export_frames(frames: Frames, out: Path, number: int) -> None:
     """Write fields as .vtu or .csv of one frame, or as .pvd or .vtkhdf of all frames.
 
-    A .vtu has both pieces or the face, a .csv the interface.
+    A .vtu file contains both pieces or the face, a .csv file the interface.
 
     Parameters
     ----------
@@ -89,9 +89,8 @@ def export_frames(frames: Frames, out: Path, number: int) -> None:
     elif out.suffix == ".pvd":
         _write_pvd(frames, out)
     elif out.suffix == ".vtu":
-        time = float(frames.times[number])
-        grid = make_grids(select_shown_blocks(frames), number, time).combine()
-        grid.field_data["TimeValue"] = [time]
+        grid = make_grids(select_shown_blocks(frames), number).combine()
+        grid.field_data["TimeValue"] = [frames.times[number]]
         _write_vtu(grid, out)
     else:
         _write_csv(frames, out, number)
@@ -119,7 +118,7 @@ def _write_pvd(frames: Frames, out: Path) -> None:
     create_folder(folder)
     lines = []
     for number, time in enumerate(frames.times.tolist()):
-        grids = make_grids(frames.blocks, number, time)
+        grids = make_grids(frames, number)
         for code, part in enumerate(frames.blocks):
             name = f"{part}_{number:04d}.vtu"
             _write_vtu(grids[part], folder / name)
@@ -151,11 +150,11 @@ def _write_csv(frames: Frames, out: Path, number: int) -> None:
     write_rows(out, [columns, *zip(*columns.values())])
 
 
-def select_shown_blocks(frames: Frames) -> dict[str, Block]:
-    """Return the blocks of a picture: both pieces, or the face."""
+def select_shown_blocks(frames: Frames) -> Frames:
+    """Return the frames with the blocks that a picture shows: both pieces, or the face."""
     if frames.is_face:
-        return frames.blocks
-    return {side: frames.blocks[side] for side in ("lower", "upper")}
+        return frames
+    return frames._replace(blocks={side: frames.blocks[side] for side in ("lower", "upper")})
 
 
 def create_folder(folder: Path) -> None:

@@ -47,14 +47,19 @@ class Frames(NamedTuple):
 
 
 def collect_frames(result, *, with_notes: bool = False) -> Frames:
-    """Compute the fields of a run in all frames.
+    """Compute the fields of a run with a patch in all of its frames.
 
     Parameters
     ----------
     result : Result
-        Result of a run with a patch.
+        Result of the run.
     with_notes : bool
-        Whether notes on yielding are added to the result.
+        Whether the result receives a note on each material that yields inside a piece.
+
+    Returns
+    -------
+    Frames
+        Without a file: its path is empty.
     """
     if result.patch.model.area is not None:
         return Frames(Path(), result.fields["time"], make_face_blocks(result))
@@ -65,12 +70,12 @@ def collect_frames(result, *, with_notes: bool = False) -> Frames:
 
 
 def write_fields(result, path: Path) -> None:
-    """Write the fields of a run as a VTKHDF file, which ParaView reads.
+    """Write the fields of a run to a VTKHDF file, the format that ParaView opens.
 
     Parameters
     ----------
     result : Result
-        Result of a run. Notes on yielding are added to it.
+        Result of a run with a patch; it receives a note on each material that yields inside a piece.
     path : Path
         File to write.
     """
@@ -79,7 +84,7 @@ def write_fields(result, path: Path) -> None:
 
 
 def write_blocks(path: Path, blocks: dict[str, Block], times: np.ndarray) -> None:
-    """Write blocks as a VTKHDF file, which gets its name when it is complete.
+    """Write blocks to a VTKHDF file, which gets its name when it is complete.
 
     Parameters
     ----------
@@ -202,7 +207,7 @@ def find_fields(folder: Path) -> Path:
 def read_frames(path: Path, names: set[str] | None = None) -> Frames:
     """Read the fields of these names from a file, by default all of them.
 
-    PatchfemError is raised if it is damaged, or was written by an older version.
+    Raises PatchfemError if it is damaged, or was written by an older version.
     """
     try:
         with h5py.File(path, "r") as file:

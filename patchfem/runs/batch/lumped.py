@@ -142,6 +142,7 @@ def find_group(model: Model) -> tuple[int, str] | None:
     rig = model.rig
     if rows.SINGLE_RUN_ROWS or model.kind != "rig" or model.patch is not None:
         return None
+
     friction = model.friction
     modes = rig.modes
     drive = rig.drive
@@ -155,10 +156,12 @@ def find_group(model: Model) -> tuple[int, str] | None:
         or np.isfinite(rig.springs.travel)
         or friction.law not in POINT_LAWS
     )
+
     # A bond population is one state variable only if all bonds are alike and do not grow.
     is_one_state = not law_has_trait(friction.law, "bonds") or not (
         needs_bond_list(friction) or friction.slip_growth is not None or friction.initial_bonds != 1
     )
+
     is_one_mode = (
         modes.omega.size == 1
         and modes.gauge is None
@@ -167,6 +170,7 @@ def find_group(model: Model) -> tuple[int, str] | None:
         and not drive.levels.amplitudes
         and modes.base[0] * modes.slide[0] * modes.output[0] != 0
     )
+
     # The cycles of a group are whole and bounded, and its only setting is the number of steps.
     is_plain = (
         MIN_BATCH_CYCLES <= drive.cycles <= MAX_BATCH_CYCLES
@@ -199,9 +203,10 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
     results = CaseResults.blank(len(models))
     is_alone = np.ones(len(models), bool)
     for indices, refined in refine(cases, scales):
-        part = _select(cases, indices), _select(scales, indices), refined
-        part_results = make_results(select_models(models, indices), *part)
-        is_alone[indices] = needs_single_run(*part, part_results)
+        part_scales = _select(scales, indices)
+        part_models = select_models(models, indices)
+        part_results = make_results(part_models, _select(cases, indices), part_scales, refined)
+        is_alone[indices] = needs_single_run(part_scales, refined, part_results)
         results.insert(indices, part_results)
     _insert_texts(models, results)
     results.seconds[:] = (process_time() - begin) / len(models)
@@ -221,7 +226,7 @@ def collect_cases(models: Sequence[Model]) -> tuple[Cases, Scales]:
     return Cases(*(np.ascontiguousarray(part.T) for part in arrays), reference[0]), Scales(*scales)
 
 
-def _list_numbers(model: Model) -> tuple:
+def _list_numbers(model: Model) -> tuple[float, ...]:
     """Return the numbers of a model as a flat tuple, which `collect_cases` takes apart again.
 
     They are the parameters of the rig (`Number`), those of the friction law, its memory at rest, the stiffness of the
@@ -645,15 +650,11 @@ def find_visible_ringing(cases: Cases, scales: Scales, refined: Refined) -> np.n
     return np.where(is_visible, ringing, 0.0)
 
 
-def needs_single_run(
-    cases: Cases, scales: Scales, refined: Refined, results: CaseResults
-) -> np.ndarray:
+def needs_single_run(scales: Scales, refined: Refined, results: CaseResults) -> np.ndarray:
     """Return a mask (n,) of the cases that only a single run can compute.
 
     Parameters
     ----------
-    cases : Cases
-        The n cases.
     scales : Scales
         Tolerances and reference quantities of the cases.
     refined : Refined

@@ -153,22 +153,17 @@ def _load_and_shape_parameters(patch_model) -> tuple[float, ...]:
     interface = patch_model.interface
     shapes = tuple(tuple(part) for _, part in patch_model.gap.shapes)
     skin = tuple(interface.skin or ())
-    parameters = (
-        astuple(patch_model.loading),
-        patch_model.mesh.slip,
-        shapes,
-        skin,
-    )
-    return tuple(_list_numbers(parameters))
+    parameters = (astuple(patch_model.loading), patch_model.mesh.slip, shapes, skin)
+    return tuple(_flatten_numbers(parameters))
 
 
-def _list_numbers(value) -> list[float]:
+def _flatten_numbers(value) -> list[float]:
     """Return all numbers in nested tuples as a flat list, in their order; None counts as 0, and texts are left out."""
     if value is None or isinstance(value, int | float):
         return [float(value or 0.0)]
     if not isinstance(value, tuple):
         return []
-    return list(chain.from_iterable(map(_list_numbers, value)))
+    return list(chain.from_iterable(map(_flatten_numbers, value)))
 
 
 def _refine_until_tolerance_is_met(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.campaigns.fits.held_out import group_by_column
+from patchfem.campaigns.held_out import group_by_column, select_held_out
 from patchfem.campaigns.rows.cells import MAX_LOG_RATIO, read_response_table
 from patchfem.core import G_N, PatchfemError
 
@@ -18,6 +18,11 @@ def write_table(tmp_path, *rows):
     return path
 
 
+def select_rows(cells, text):
+    """Return the mask of the readings that a text of --hold selects."""
+    return select_held_out(text, cells.path, cells.columns)
+
+
 def test_exact_conditions_that_differ_by_round_off_are_one(tmp_path):
     """Frequencies that differ by 1e-13 are one condition, and a selector finds both; those that differ by 1e-8 are two.
 
@@ -28,7 +33,7 @@ def test_exact_conditions_that_differ_by_round_off_are_one(tmp_path):
     cells = read_response_table(write_table(tmp_path, *rows))
     assert cells.conditions[:, 0].tolist() == [high, other]
     assert cells.condition.tolist() == [0, 0, 0, 0, 1, 1]
-    assert cells.select_readings(f"frequency={low!r} Hz").tolist() == [True] * 4 + [False] * 2
+    assert select_rows(cells, f"frequency={low!r} Hz").tolist() == [True] * 4 + [False] * 2
 
 
 def test_exact_repeated_conditions_are_separate_readings(tmp_path):
@@ -38,7 +43,7 @@ def test_exact_repeated_conditions_are_separate_readings(tmp_path):
     )
     assert cells.condition.tolist() == [0, 0, 0, 1] and cells.row.tolist() == [0, 0, 1, 3]
     assert cells.conditions.tolist() == [[143.0, 4 * G_N], [143.0, 5 * G_N]]
-    logs = cells.compute_log_ratios([4.5 * G_N, np.inf], [0.2 * MIL, 1.0])
+    logs = cells.compute_logs(cells.select_computed([4.5 * G_N, np.inf], [0.2 * MIL, 1.0]))
     assert logs == pytest.approx(
         [np.log(0.9), np.log(2), np.log(4.5 / 4), MAX_LOG_RATIO], rel=1e-14
     )
@@ -49,11 +54,11 @@ def test_exact_rows_are_selected_by_frequency_input_flag_or_run(tmp_path):
     cells = read_response_table(
         write_table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "0150,4,5,,U")
     )
-    assert cells.select_readings("frequency=150 Hz").tolist() == [False, False, False, True]
-    assert cells.select_readings("frequency=0.143 kHz,150 Hz").all()
-    assert cells.select_readings("input=4 g").all()
-    assert cells.select_readings("flag=R").tolist() == [False, False, True, False]
-    assert cells.select_readings("run=143 Hz repeat").tolist() == [False, False, True, False]
+    assert select_rows(cells, "frequency=150 Hz").tolist() == [False, False, False, True]
+    assert select_rows(cells, "frequency=0.143 kHz,150 Hz").all()
+    assert select_rows(cells, "input=4 g").all()
+    assert select_rows(cells, "flag=R").tolist() == [False, False, True, False]
+    assert select_rows(cells, "run=143 Hz repeat").tolist() == [False, False, True, False]
     groups = group_by_column("run", cells.path, cells.columns, np.ones(4, bool))
     assert [int(group.sum()) for group in groups] == [2, 1, 1]
 
@@ -72,7 +77,7 @@ def test_exact_rows_are_selected_by_frequency_input_flag_or_run(tmp_path):
 def test_refuses_selection_without_rows(tmp_path, text, wanted):
     """A selection without rows is refused."""
     with pytest.raises(PatchfemError, match=wanted):
-        read_response_table(write_table(tmp_path, "143,4,5.0,0.1,")).select_readings(text)
+        select_rows(read_response_table(write_table(tmp_path, "143,4,5.0,0.1,")), text)
 
 
 @pytest.mark.parametrize(

@@ -178,9 +178,14 @@ def test_always_some_cases_agree_with_single_runs(kind, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_always_points_of_a_law_agree_with_single_runs(law, tmp_path, monkeypatch):
-    """Of the first of many points, which are marched together, 97 % of the values of each law lie within both errors."""
+    """The values of the first of many points, which are marched together, lie within the sum of both errors.
+
+    An error follows from two marches with different steps and is too small where the change between them is so by
+    accident: one distortion of `lugre` differs by 2.1 times both errors, 6e-5 of its value.
+    """
     monkeypatch.chdir(tmp_path)
-    assert np.mean(np.array(compare_kind(law, MANY, 4)) <= 1) >= 0.97
+    ratios = np.array(compare_kind(law, MANY, 4))
+    assert np.count_nonzero(ratios > 1) <= (law == "lugre") and ratios.max() < 3
 
 
 @pytest.mark.slow

@@ -21,8 +21,7 @@ from ....response.rows import AMPLITUDE
 from ...results.patch_rows import Arrays
 from ..evaluation import EXACT_RELATIVE_ERROR, Solution, replace_output_by_gauge
 
-# Smallest reference value of relative errors, relative to the largest value of the curve; it is
-# needed if a curve starts from 0.
+# An error is relative to the value, but at least to this fraction of the largest value of the curve, which may start at 0.
 MIN_VALUE_RATIO = 1e-3
 # Smallest interval that is halved, relative to its abscissa; it ends the refinement at a jump.
 MIN_INTERVAL_RATIO = 1e-6

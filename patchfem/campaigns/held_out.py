@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import PatchfemError
-from ...formatting import format_length
-from ...inputs.damage import shorten
-from ...scene.keys.quantities import parse_quantity
+from ..core import PatchfemError
+from ..formatting import format_length
+from ..inputs.damage import shorten
+from ..scene.keys.quantities import parse_quantity
 
 MAX_LISTED_VALUES_CHARACTERS = 200  # largest number of characters of a list of values in a message
 EQUAL_NUMBERS_TOL = 1e-9  # largest relative difference at which two numbers count as equal
