@@ -43,7 +43,8 @@ PHYSICS = set(
     "time_steps wear".split()
 )
 PIECES = "contact elasticity mesh "  # folders needed to solve a static patch
-MOTION = "compiled friction hybrid response structure "  # folders needed to integrate the motion of a rig
+MOTION = "compiled hybrid response structure "  # folders needed to integrate the motion of a rig
+SLIDING = MOTION + "friction "  # the same with friction
 BENCH_FOLDERS = "friction response "  # folders needed to follow a prescribed slide
 WEAR = '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
 FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run` loads for the run and its page
@@ -51,12 +52,12 @@ FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run`
     "bench of a point": (BENCH, BENCH_FOLDERS),
     "bench of a patch": (COATED + COULOMB + TRIANGLE, PIECES + BENCH_FOLDERS),
     "linear rig": (STRUCTURE, MOTION),
-    "rig of a point": (COULOMB_RIG, MOTION),
-    "rig of elements": (PLASTIC_RIG, MOTION),
-    "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + MOTION),
+    "rig of a point": (COULOMB_RIG, SLIDING),
+    "rig of elements": (PLASTIC_RIG, SLIDING),
+    "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + SLIDING),
     "rig of a patch with slip": (
         COATED + SHEAR + PLASTIC + STRUCTURE,
-        PIECES + MOTION + "slip",
+        PIECES + SLIDING + "slip",
     ),
     "wear": (COATED + COULOMB + TRIANGLE + WEAR, PIECES + BENCH_FOLDERS + "time_steps wear"),
 }
@@ -88,6 +89,11 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         PATCH + '[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n',
         "contact.asperity_laws",
         PATCH_KEYS,
+    ),
+    "linear rig": (
+        STRUCTURE,
+        "hybrid.runs structure.modes",
+        "hybrid.stored_energy hybrid.laws.grooves hybrid.laws.masing hybrid.laws.springs",
     ),
     "point on a rig": (
         COULOMB_RIG,

@@ -8,8 +8,7 @@ import numpy as np
 from ..core import MIN_LOAD, ModalBasis
 from ..structure.drive_sizes import find_max_acceleration
 from .drives import Signal, make_signal
-from .laws import LAWS, is_rigid, masing
-from .laws.springs import make_cubic, make_interlocking
+from .laws import LAWS, is_rigid, masing, springs
 from .records import (
     N_INTEGRALS,
     N_NODES,
@@ -304,9 +303,10 @@ def list_interfaces(rig, joints) -> list[Interface]:
     interfaces = [Interface(*joint, row) for joint, row in zip(joints, rows)]
     # Springs act before rigid friction on grooves, which needs the acceleration without it.
     if rig.springs.cubic is not None:
-        interfaces.append(Interface(make_cubic(rig.springs.cubic), Load(1.0), rig.modes.output))
+        spring = springs.make_cubic(rig.springs.cubic)
+        interfaces.append(Interface(spring, Load(1.0), rig.modes.output))
     if rig.springs.interlock is not None:
-        spring = make_interlocking(*rig.springs.interlock)
+        spring = springs.make_interlocking(*rig.springs.interlock)
         interfaces.append(Interface(spring, Load(1.0), rows[0]))
     return interfaces
 

@@ -11,6 +11,7 @@ import numpy as np
 from .. import compiled
 from ..core import ModalBasis, Response
 from ..structure.histories import make_response
+from . import stored_energy
 from .cases import Case, make_arrays
 from .measures import compute_measures, split_integrals
 from .records import (
@@ -25,7 +26,6 @@ from .records import (
     State,
     Status,
 )
-from .stored_energy import compute_stored_energy
 
 COARSE = 30.0  # ratio of the step tolerances of the comparison run and of the run
 COARSE_STEP = 2.0  # ratio of their longest steps
@@ -119,7 +119,10 @@ class Motion:
         # The integrals are friction work, path of slip and loss. Work that is not lost is stored; none is created.
         work = integrals[:, :m, 0].sum(1)
         loss = integrals[:, :m, 2].sum(1)
-        stored = compute_stored_energy(self.case, self.first_memory) + work - loss
+        stored_at_start = 0.0
+        if m:
+            stored_at_start = stored_energy.compute_stored_energy(self.case, self.first_memory)
+        stored = stored_at_start + work - loss
         slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
         ledger = [work, np.maximum(stored, 0.0), loss, np.zeros(time.size)]
         extra = {"ledger": np.stack(ledger)}
