@@ -3,10 +3,8 @@
 import os
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
-from tempfile import TemporaryDirectory
 
 import pytest
 from command_line import (
@@ -92,7 +90,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
     ),
     "linear rig": (
         STRUCTURE,
-        "hybrid.runs structure.modes",
+        "hybrid.runs",
         "hybrid.stored_energy hybrid.laws.grooves hybrid.laws.masing hybrid.laws.springs",
     ),
     "point on a rig": (
@@ -113,21 +111,12 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
 }
 
 
-@cache
-def modules_of_run(text: str) -> set:
-    """Return the names in sys.modules after a run of a scene from Python."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder, "scene.toml")
-        path.write_text(text, "utf-8")
-        return modules_after(FROM_PYTHON, path)
-
-
 @pytest.mark.share(0)
 @pytest.mark.parametrize("name", MODULES_OF_SCENES)
-def test_exact_run_loads_modules_of_its_keys(name):
+def test_exact_run_loads_modules_of_its_keys(write_scene, name):
     """A run from Python loads the modules of the keys in its scene, and not those of absent keys."""
     text, present, missing = MODULES_OF_SCENES[name]
-    modules = modules_of_run(text)
+    modules = modules_after(FROM_PYTHON, write_scene(text))
     assert {f"patchfem.{module}" for module in present.split()} <= modules
     found = [module for module in missing.split() if has_code_of(modules, module)]
     assert not found and "pyuff" not in modules

@@ -119,12 +119,11 @@ class Motion:
         # The integrals are friction work, path of slip and loss. Work that is not lost is stored; none is created.
         work = integrals[:, :m, 0].sum(1)
         loss = integrals[:, :m, 2].sum(1)
-        stored_at_start = 0.0
+        supplied = work
         if m:
-            stored_at_start = stored_energy.compute_stored_energy(self.case, self.first_memory)
-        stored = stored_at_start + work - loss
+            supplied = work + stored_energy.compute_stored_energy(self.case, self.first_memory)
         slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
-        ledger = [work, np.maximum(stored, 0.0), loss, np.zeros(time.size)]
+        ledger = [work, np.maximum(supplied - loss, 0.0), loss, np.zeros(time.size)]
         extra = {"ledger": np.stack(ledger)}
 
         if m and rig.faces[0, Face.SWING]:
