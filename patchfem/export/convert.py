@@ -153,9 +153,21 @@ def view_results(
 
 
 def _open_window(frames: Frames, number: int, title: str) -> None:
-    """Open a window with the von Mises stress in both pieces, or with the pressure over a face.
+    """Show the von Mises stress in both pieces, or the pressure over a face, in a window.
 
-    `number` is the index of the frame to show, and `title` that of the window. Missing is raised if there is no screen.
+    Parameters
+    ----------
+    frames : Frames
+        Fields of the run.
+    number : int
+        Index of the frame that is shown.
+    title : str
+        Title of the run, which that of the window contains.
+
+    Raises
+    ------
+    Missing
+        If there is no screen.
     """
     has_screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform.startswith("linux") and not has_screen:

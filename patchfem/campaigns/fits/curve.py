@@ -258,7 +258,7 @@ class CurveComparison(Comparison):
         amplitudes = np.geomspace(*ends, N_CURVE_POINTS)
 
         def compute(values) -> np.ndarray:
-            """Return frequency [Hz] and damping ratio (2, j) for values of the parameters."""
+            """Return frequency [Hz] and damping ratio (rows of (2, j)) at the amplitudes, for fitted `values`."""
             return compute_points(self.keys.build_model(values), amplitudes, self.method)
 
         half_widths = np.ptp(fit.intervals.ends, axis=1) / 2

@@ -46,20 +46,20 @@ class Frames(NamedTuple):
         return len(self.blocks) == 1
 
 
-def collect_frames(result, *, with_notes: bool = False) -> Frames:
+def collect_frames(result, *, adds_yielding_notes: bool = False) -> Frames:
     """Compute the fields of a run in all frames.
 
     Parameters
     ----------
     result : Result
         Result of a run with a patch.
-    with_notes : bool
-        Whether notes on yielding are added to the result.
+    adds_yielding_notes : bool
+        Whether the notes of the result are completed by those on yielding.
     """
     if result.patch.model.area is not None:
         return Frames(Path(), result.fields["time"], make_face_blocks(result))
     pieces = compute_pieces(result)
-    if with_notes:
+    if adds_yielding_notes:
         add_yielding_notes(result, pieces)
     return Frames(Path(), pieces.time, make_blocks(pieces))
 
@@ -74,7 +74,7 @@ def write_fields(result, path: Path) -> None:
     path : Path
         File to write.
     """
-    frames = collect_frames(result, with_notes=True)
+    frames = collect_frames(result, adds_yielding_notes=True)
     write_blocks(path, frames.blocks, frames.times)
 
 

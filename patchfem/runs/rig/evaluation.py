@@ -59,8 +59,7 @@ class Solution:
     - contact: contact model of the run.
     - prepare: CPU time of each part of the preparation [s].
     - message: reason of an early end.
-    - levels, run_level: Level of each drive level, and a function that runs another level, see
-      `levels.find_onset`.
+    - levels, run_level: Level of each drive level, and a function that runs another level (`find_onset`).
     - log: events of an event-driven engine.
     - notes: warnings of the engine.
     - stick_tolerance: largest slip per cycle [m] at which the interface counts as stuck.
@@ -279,10 +278,10 @@ def add_level_errors(
 
 
 class Onset(NamedTuple):
-    """Drive level of an onset, from a bracket of two levels [m s-2].
+    """Drive level of an onset, which lies between two levels of a bisection.
 
-    - level: middle of the bracket
-    - error: half its width
+    - level: mean of both levels [m s-2].
+    - error: half their difference [m s-2].
     """
 
     level: float
