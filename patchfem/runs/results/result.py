@@ -50,19 +50,9 @@ class Advice(NamedTuple):
     axis: str = ""
 
     @classmethod
-    def set_key(cls, key: str, value: float, more: str = "") -> "Advice":
-        """Return the advice to set a key to a number.
-
-        Parameters
-        ----------
-        key : str
-            Key as the scene writes it, "table.key".
-        value : float
-            Number in the unit of the key.
-        more : str
-            Words that follow the value.
-        """
-        return cls(f"set {key} = {value}{more}", key, value)
+    def set_key(cls, key: str, value: float) -> "Advice":
+        """Return the advice to set a key, "table.key", to a number in the unit of the key."""
+        return cls(f"set {key} = {value}", key, value)
 
 
 class Finding(NamedTuple):

@@ -62,7 +62,7 @@ def _split_by_interface(model: Model) -> list[Model]:
     return parts
 
 
-def has_bond_list(model: Model, numerics: Numerics) -> bool:
+def has_bond_list(model: Model) -> bool:
     """Return whether an interface needs a list of all bonds that have formed, over which its force is summed."""
     if model.friction is None:
         return False
@@ -163,7 +163,7 @@ def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
     meaningless, and every step would leave permanent bonds, so that the CPU time would increase
     with the square of the number of steps.
     """
-    if not has_bond_list(model, numerics) or model.partial_slip:
+    if not has_bond_list(model) or model.partial_slip:
         return
     modes = model.rig.modes
     drive = model.rig.drive.signal

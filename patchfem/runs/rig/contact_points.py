@@ -62,7 +62,7 @@ def make_contact(model: Model, numerics, patch):
             surfaces = _list_surfaces(model, numerics, patch)
             halves = {"has_half_cells": numerics.has_half_cells}
             surfaces = [part._replace(**halves) for part in surfaces]
-            if bond_lists.has_bond_list(model, numerics):
+            if bond_lists.has_bond_list(model):
                 choice = bond_lists.choose_bond_summation(model, numerics)
                 sums = [make_bond_sum(model, part.keys, choice) for part in surfaces]
                 surfaces = [part._replace(bond_sum=one) for part, one in zip(surfaces, sums)]
