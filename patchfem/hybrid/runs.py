@@ -135,25 +135,17 @@ class Motion:
         )
 
 
-def estimate_errors(
-    values: dict[str, float], coarse: dict[str, float], rtol: float
-) -> dict[str, float]:
-    """Return the errors of measures from those of a run with larger steps.
+def estimate_error(change, value, rtol: float):
+    """Return the error of a value, or of several, from its change in a run with larger steps.
 
     Parameters
     ----------
-    values, coarse : dict
-        Measures of a run and of the comparison run by name.
+    change, value : float or (..., k) array
+        Difference of the values of both runs, and the value of the run.
     rtol : float
         Step tolerance of the run.
     """
-    errors = {}
-    for name, value in values.items():
-        change = value - coarse[name]
-        if name == "slip_start_phase":
-            change = (change + np.pi / 2) % np.pi - np.pi / 2
-        errors[name] = ERROR_FACTOR * np.abs(change) + ERROR_FLOOR * rtol * np.abs(value)
-    return errors
+    return ERROR_FACTOR * np.abs(change) + ERROR_FLOOR * rtol * np.abs(value)
 
 
 def run_case(case: Case, *, start: State | None = None) -> Motion:

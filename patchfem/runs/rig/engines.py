@@ -19,6 +19,7 @@ from ...model.model import Model
 from ...response.errors import (
     CoarserRuns,
     ComparisonRuns,
+    absolute_change,
     convergence_errors,
     edge_errors,
     estimate_sampling_errors,
@@ -237,12 +238,14 @@ def _list_hybrid_time_runs(model: Model, numerics) -> ComparisonRuns:
 
     `numerics` are the settings of the run whose errors are estimated.
     """
-    coarse = replace(
-        numerics,
-        local=hybrid.runs.COARSE * numerics.local,
-        steps=numerics.steps / hybrid.runs.COARSE_STEP,
-    )
+    coarse = enlarge_hybrid_steps(numerics)
     return [CoarserRuns((coarse,), partial(estimate_hybrid_errors, rtol=numerics.local))]
+
+
+def enlarge_hybrid_steps(numerics):
+    """Return the settings of the engine `hybrid` with a larger step tolerance and longer steps, for a comparison run."""
+    local = hybrid.runs.COARSE * numerics.local
+    return replace(numerics, local=local, steps=numerics.steps / hybrid.runs.COARSE_STEP)
 
 
 def estimate_hybrid_errors(values: Values, coarse_values: Values, rtol: float) -> Values:
@@ -255,8 +258,10 @@ def estimate_hybrid_errors(values: Values, coarse_values: Values, rtol: float) -
     rtol : float
         Step tolerance of the run.
     """
-    shared = {name: value for name, value in values.items() if name in coarse_values}
-    return hybrid.runs.estimate_errors(shared, coarse_values, rtol)
+    errors = {}
+    for name, change in absolute_change(values, coarse_values).items():
+        errors[name] = hybrid.runs.estimate_error(change, values[name], rtol)
+    return errors
 
 
 def _list_hybrid_space_runs(model: Model, numerics, patch, n_coarse, solution) -> ComparisonRuns:

@@ -15,7 +15,6 @@ from .... import compiled
 from ....core import NotConverged, Outcome, PatchfemError, SineDrive
 from ....formatting import format_length
 from ....hybrid import cases, periodic
-from ....hybrid import runs as hybrid_runs
 from ....hybrid.continuation import PathPoint, PathSettings
 from ....hybrid.laws import is_rigid, masing
 from ....hybrid.periodic_curves import CurveStart, PeriodEquations, measure_distance
@@ -25,7 +24,7 @@ from ....response.rows import AMPLITUDE
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
 from ...results.result import Settings, SteadyData
-from ..engines import estimate_hybrid_errors, may_fold
+from ..engines import enlarge_hybrid_steps, estimate_hybrid_errors, may_fold
 from ..evaluation import Solution
 from ..event_to_event import LumpedEvaluator
 from ..joints import make_joints
@@ -282,11 +281,7 @@ class ShootingFinder:
         is_stuck : bool
             Whether the interface sticks all the time.
         """
-        coarse = replace(
-            self.numerics,
-            local=hybrid_runs.COARSE * RTOL,
-            steps=cases.MIN_STEPS / hybrid_runs.COARSE_STEP,
-        )
+        coarse = enlarge_hybrid_steps(self.numerics)
         other = LumpedEvaluator(self.model, coarse, self.patch, self.joints)
         start = None if motion.grows else motion.run.final
         other_run = other.resume(drive, run.cycles_done, start, 0)
