@@ -492,6 +492,7 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     Missing
         With the largest contribution and its remedy.
     """
+    # A run that fits into what is free and allowed goes on without a word.
     parts = list_memory_parts(plan)
     total = sum(part.bytes for part in parts)
     free = free_bytes()
@@ -504,6 +505,8 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     if total > free:
         limit = f"only {max(free, 0.0) / 1e9:.2g} GB are free"
         other_remedy = ""
+
+    # A remedy is named for the largest part that the scene determines, if it is a noticeable one.
     text = f"about {total / 1e9:.3g} GB of memory are needed, but {limit}"
     largest = next(part for part in parts if part.remedy)
     if largest.bytes < 0.1 * total:
@@ -511,6 +514,7 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     else:
         size = f"{largest.bytes / 1e9:.3g} GB"
         text += f"; {size} of these are for {largest.what}: {largest.remedy}{other_remedy}"
+
     if total > free or given is not None:
         raise Missing(text, "")
     if say is not None:

@@ -165,6 +165,8 @@ def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
     """
     if not has_bond_list(model) or model.partial_slip:
         return
+
+    # Highest frequency of the block on the bonds of one interface, with the mass that this interface moves
     modes = model.rig.modes
     drive = model.rig.drive.signal
     omega = 0.0
@@ -175,6 +177,7 @@ def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
             f = part.friction
             mobility = float((row**2).sum()) / modes.mass
             omega = max(omega, sqrt(f.static * part.nominal_load / f.bond_length * mobility))
+
     phase = omega * drive.period / numerics.steps
     if phase > MAX_BOND_VIBRATION_PHASE:
         wanted = ceil(omega * drive.period)

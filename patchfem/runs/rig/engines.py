@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import hybrid, slip
+from ... import friction, hybrid, slip
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
 from ...response.errors import (
@@ -107,7 +107,7 @@ def list_runs_with_other_modes(model: Model, numerics) -> ComparisonRuns:
     return [CoarserRuns(runs, finer_errors, beside, "reduced")]
 
 
-def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> list:
+def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> list["Numerics"]:
     """List numerical settings in which one patch of a model has a coarser mesh: that of [contact], or of an interface.
 
     Interfaces with equal patches are coarsened together.
@@ -388,7 +388,7 @@ class Numerics:
     cycles: float
     window: int
     shear_modes: int | None
-    choice: object = None
+    choice: "friction.bonds.engines.EngineChoice | None" = None
     whole: bool = True
     local: float = 0.0
     other_rig: int | None = None

@@ -5,7 +5,7 @@ more accurately than from samples. If the amplitude of the drive changes in leve
 level: there is a `Level` with errors for each of them, the onset level found by bisection, and the joined run.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -87,13 +87,13 @@ class Solution:
     prepare: Values | None = None
     message: str = ""
     levels: tuple[Level, ...] = ()
-    run_level: object = None
+    run_level: Callable[[int, float], Level] | None = None
     log: Events | None = None
     notes: tuple[str, ...] = ()
     stick_tolerance: float = 0.0
     run_errors: Values = field(default_factory=dict)
     errors: Values | None = None
-    bond_summation: object = None
+    bond_summation: "friction.bonds.engines.EngineChoice | None" = None
     coarser: "tuple[tuple[Solution, Solution | None], ...]" = ()
     extremes: np.ndarray | None = None
     phasors: np.ndarray | None = None

@@ -463,6 +463,7 @@ def choose_sample_times(numerics, drive, cycles: float, frames: int = 0) -> Samp
     numerics : Numerics
         Number of cycles of the window, and whether the histories before it are stored.
     drive : drives.DriveSignal
+        Drive, whose period divides the run into cycles.
     cycles : float
         Number of cycles of the drive in the run.
     frames : int

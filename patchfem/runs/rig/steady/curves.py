@@ -238,7 +238,7 @@ def note_end_of_curve(points: list[CurvePoint], ended: str, last: float) -> list
     points : list of CurvePoint
         Points of the curve.
     ended : str
-        Why it ends, see `hybrid.continuation.CurvePath`.
+        Key of REASONS_OF_END, or "end".
     last : float
         Last frequency of the sweep [Hz].
     """

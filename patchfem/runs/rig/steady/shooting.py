@@ -109,6 +109,7 @@ class ShootingFinder:
         NotConverged
             If no motion is found that repeats after each cycle.
         """
+        # A damped motion whose stability does not matter follows from its guess in a few periods; any other is searched.
         case = self.make_case(drive)
         is_undamped = self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL
         if guess is None or needs_stability or is_undamped:
@@ -123,6 +124,8 @@ class ShootingFinder:
             motion = periodic.follow_periodic_motion(case, guess)
         if motion.grows:
             return motion
+
+        # The motion must repeat, as closely as its caller needs it.
         tolerance = motion.tolerance
         if not needs_stability:
             tolerance = max(tolerance, periodic.MAX_KINKED_CHANGE)
@@ -333,7 +336,7 @@ class ShootingFinder:
         guess : PeriodicMotion, optional
             Neighbouring motion; from rest by default.
         needs_stability : bool
-            Whether stability and errors are needed, as in `find_periodic_motion`.
+            Whether the multipliers and the errors of the motion are needed.
         """
         # Two motions need no search: that of a linear rig, and that of a mass that leaves its grooves.
         is_linear = not (self.joints.laws or self.model.rig.springs.is_nonlinear)
