@@ -3,10 +3,8 @@
 import os
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
-from tempfile import TemporaryDirectory
 
 import pytest
 from command_line import (
@@ -43,7 +41,8 @@ PHYSICS = set(
     "time_steps wear".split()
 )
 PIECES = "contact elasticity mesh "  # folders needed to solve a static patch
-MOTION = "compiled friction hybrid response structure "  # folders needed to integrate the motion of a rig
+MOTION = "compiled hybrid response structure "  # folders needed to integrate the motion of a rig
+SLIDING = MOTION + "friction "  # the same with friction
 BENCH_FOLDERS = "friction response "  # folders needed to follow a prescribed slide
 WEAR = '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
 FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run` loads for the run and its page
@@ -51,12 +50,12 @@ FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run`
     "bench of a point": (BENCH, BENCH_FOLDERS),
     "bench of a patch": (COATED + COULOMB + TRIANGLE, PIECES + BENCH_FOLDERS),
     "linear rig": (STRUCTURE, MOTION),
-    "rig of a point": (COULOMB_RIG, MOTION),
-    "rig of elements": (PLASTIC_RIG, MOTION),
-    "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + MOTION),
+    "rig of a point": (COULOMB_RIG, SLIDING),
+    "rig of elements": (PLASTIC_RIG, SLIDING),
+    "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + SLIDING),
     "rig of a patch with slip": (
         COATED + SHEAR + PLASTIC + STRUCTURE,
-        PIECES + MOTION + "slip",
+        PIECES + SLIDING + "slip",
     ),
     "wear": (COATED + COULOMB + TRIANGLE + WEAR, PIECES + BENCH_FOLDERS + "time_steps wear"),
 }
@@ -89,6 +88,11 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         "contact.asperity_laws",
         PATCH_KEYS,
     ),
+    "linear rig": (
+        STRUCTURE,
+        "hybrid.runs",
+        "hybrid.stored_energy hybrid.laws.grooves hybrid.laws.masing hybrid.laws.springs",
+    ),
     "point on a rig": (
         COULOMB_RIG,
         "hybrid.runs structure.modes",
@@ -107,21 +111,12 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
 }
 
 
-@cache
-def modules_of_run(text: str) -> set:
-    """Return the names in sys.modules after a run of a scene from Python."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder, "scene.toml")
-        path.write_text(text, "utf-8")
-        return modules_after(FROM_PYTHON, path)
-
-
 @pytest.mark.share(0)
 @pytest.mark.parametrize("name", MODULES_OF_SCENES)
-def test_exact_run_loads_modules_of_its_keys(name):
+def test_exact_run_loads_modules_of_its_keys(write_scene, name):
     """A run from Python loads the modules of the keys in its scene, and not those of absent keys."""
     text, present, missing = MODULES_OF_SCENES[name]
-    modules = modules_of_run(text)
+    modules = modules_after(FROM_PYTHON, write_scene(text))
     assert {f"patchfem.{module}" for module in present.split()} <= modules
     found = [module for module in missing.split() if has_code_of(modules, module)]
     assert not found and "pyuff" not in modules

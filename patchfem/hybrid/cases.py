@@ -8,8 +8,7 @@ import numpy as np
 from ..core import MIN_LOAD, ModalBasis
 from ..structure.drive_sizes import find_max_acceleration
 from .drives import Signal, make_signal
-from .laws import LAWS, is_rigid, masing
-from .laws.springs import make_cubic, make_interlocking
+from .laws import LAWS, is_rigid, masing, springs
 from .records import (
     N_INTEGRALS,
     N_NODES,
@@ -303,10 +302,12 @@ def list_interfaces(rig, joints) -> list[Interface]:
     rows = rig.modes.interfaces
     interfaces = [Interface(*joint, row) for joint, row in zip(joints, rows)]
     # Springs act before rigid friction on grooves, which needs the acceleration without it.
-    if rig.springs.cubic is not None:
-        interfaces.append(Interface(make_cubic(rig.springs.cubic), Load(1.0), rig.modes.output))
-    if rig.springs.interlock is not None:
-        spring = make_interlocking(*rig.springs.interlock)
+    given = rig.springs
+    if given.cubic is not None:
+        spring = springs.make_cubic(given.cubic)
+        interfaces.append(Interface(spring, Load(1.0), rig.modes.output))
+    if given.interlock is not None:
+        spring = springs.make_interlocking(*given.interlock)
         interfaces.append(Interface(spring, Load(1.0), rows[0]))
     return interfaces
 
@@ -404,8 +405,8 @@ def make_arrays(case: Case, n_events: int = 0) -> tuple[State, Record]:
     memory[:, [Memory.CONTACT, Memory.COUNT, Memory.VIRGIN]] = 1.0
     for i in range(n_faces):
         law = LAWS[int(rig.faces[i, Face.LAW])]
-        memory[i, Memory.FLAG] = law in ("bouc_wen",)
-        memory[i, Memory.COUNT] = law in ("pressed_springs",)
+        memory[i, Memory.FLAG] = law == "bouc_wen"
+        memory[i, Memory.COUNT] = law == "pressed_springs"
         if law in ("bonds", "lugre"):
             memory[i, Memory.FLAG] = -1.0
 

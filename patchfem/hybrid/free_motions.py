@@ -48,7 +48,7 @@ from .records import (
     State,
     Window,
 )
-from .runs import COARSE, COARSE_STEP, ERROR_FACTOR, ERROR_FLOOR, run_case
+from .runs import COARSE, COARSE_STEP, ERROR_FLOOR, estimate_error, run_case
 
 CHANGE_TOL = 1e-10  # change over half a period, relative to the motion, that counts as none
 MAX_STEPS = 1e5  # steps of the engine in the first periods of the search for a motion
@@ -113,8 +113,7 @@ def estimate_errors(values, rough, distances=0.0) -> np.ndarray:
     distances : (..., k) array
         Changes of the values by the next Newton step of the motions.
     """
-    error = ERROR_FACTOR * np.abs(values - rough)
-    return error + ERROR_FLOOR * FINE.rtol * np.abs(values) + distances
+    return estimate_error(values - rough, values, FINE.rtol) + distances
 
 
 class FreeMotion(NamedTuple):

@@ -11,6 +11,7 @@ import numpy as np
 from .. import compiled
 from ..core import ModalBasis, Response
 from ..structure.histories import make_response
+from . import stored_energy
 from .cases import Case, make_arrays
 from .measures import compute_measures, split_integrals
 from .records import (
@@ -25,7 +26,6 @@ from .records import (
     State,
     Status,
 )
-from .stored_energy import compute_stored_energy
 
 COARSE = 30.0  # ratio of the step tolerances of the comparison run and of the run
 COARSE_STEP = 2.0  # ratio of their longest steps
@@ -119,9 +119,11 @@ class Motion:
         # The integrals are friction work, path of slip and loss. Work that is not lost is stored; none is created.
         work = integrals[:, :m, 0].sum(1)
         loss = integrals[:, :m, 2].sum(1)
-        stored = compute_stored_energy(self.case, self.first_memory) + work - loss
+        supplied = work
+        if m:
+            supplied = work + stored_energy.compute_stored_energy(self.case, self.first_memory)
         slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
-        ledger = [work, np.maximum(stored, 0.0), loss, np.zeros(time.size)]
+        ledger = [work, np.maximum(supplied - loss, 0.0), loss, np.zeros(time.size)]
         extra = {"ledger": np.stack(ledger)}
 
         if m and rig.faces[0, Face.SWING]:
@@ -133,25 +135,17 @@ class Motion:
         )
 
 
-def estimate_errors(
-    values: dict[str, float], coarse: dict[str, float], rtol: float
-) -> dict[str, float]:
-    """Return the errors of measures from those of a run with larger steps.
+def estimate_error(change, value, rtol: float):
+    """Return the error of a value, or of several, from its change in a run with larger steps.
 
     Parameters
     ----------
-    values, coarse : dict
-        Measures of a run and of the comparison run by name.
+    change, value : float or (..., k) array
+        Difference of the values of both runs, and the value of the run.
     rtol : float
         Step tolerance of the run.
     """
-    errors = {}
-    for name, value in values.items():
-        change = value - coarse[name]
-        if name == "slip_start_phase":
-            change = (change + np.pi / 2) % np.pi - np.pi / 2
-        errors[name] = ERROR_FACTOR * np.abs(change) + ERROR_FLOOR * rtol * np.abs(value)
-    return errors
+    return ERROR_FACTOR * np.abs(change) + ERROR_FLOOR * rtol * np.abs(value)
 
 
 def run_case(case: Case, *, start: State | None = None) -> Motion:

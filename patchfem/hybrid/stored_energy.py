@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..friction.laws import iwan
+from .. import friction
 from .cases import Case
 from .laws import LAWS, masing
 from .records import Face, LawNumbers, Memory
@@ -58,7 +58,7 @@ def _stretch_elements(now: InterfaceState) -> float:
     p = now.p
     if p[1] >= 0:
         stiffness = p[2] * (1 + p[1]) / (p[1] + (p[0] + 1) / (p[0] + 2)) / p[3]
-        stiffness, limit = iwan.slider_cells(p[2], stiffness, p[0], p[1])
+        stiffness, limit = friction.laws.iwan.slider_cells(p[2], stiffness, p[0], p[1])
     else:
         stiffness, limit = masing.list_elements(LawNumbers("masing", p))
 

@@ -82,6 +82,7 @@ PUBLIC = {
     "rig.engines": (
         "ENGINES",
         "choose_numerics",
+        "estimate_hybrid_errors",
         "find_obstacle_of_map",
     ),
     "rig.plan": (

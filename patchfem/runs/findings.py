@@ -349,13 +349,15 @@ ADVICE_BY_AXIS: dict[str, Callable[[Missed], Advice | None]] = {
 }
 
 
-# Largest relative residual of the load; the contact solver reaches 1e-9 or less.
+# ---- balances
+
+# Largest difference of the integral of the pressure from the load, relative to the load; the contact solver reaches 1e-9.
 LOAD_BALANCE_TOL = 1e-6
-# Largest residual of the energy of a bench relative to the exchanged energy. All terms are integrated by the same rule,
-# so that the residual falls with the number of steps.
-BENCH_ENERGY_TOL = 0.01
-# The same of a march, whose energies differ by round-off only. A billion steps have less.
-MARCH_ENERGY_TOL = 1e-8
+# Largest energy that is missing or was created in a bench, relative to the exchanged energy. All terms are integrated by
+# the same rule, so that this residual falls with the number of steps.
+MAX_BENCH_ENERGY_RESIDUAL = 0.01
+# The same in a run with equal time steps, where the residual is round-off; a billion steps have less.
+MAX_MARCH_ENERGY_RESIDUAL = 1e-8
 
 
 def mark_unbalanced(result: Result) -> Result:
@@ -408,9 +410,9 @@ def _check_energy(result: Result) -> Iterator[str]:
     residual = result.measures.get("energy_balance")
     if residual is None or residual.value is None:
         return
-    limit = BENCH_ENERGY_TOL
+    limit = MAX_BENCH_ENERGY_RESIDUAL
     if result.plan.model.rig is not None:
-        limit = MARCH_ENERGY_TOL if result.settings.steps_per_cycle else inf
+        limit = MAX_MARCH_ENERGY_RESIDUAL if result.settings.steps_per_cycle else inf
     if abs(residual.value) > limit:
         yield (
             f"energy balance: {abs(residual.value):.2g} of the exchanged energy is missing or was created (limit "
@@ -418,8 +420,10 @@ def _check_energy(result: Result) -> Iterator[str]:
         )
 
 
-LONG_SUM_ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
-# Smallest ratio of the errors with finer and coarser steps at which the steps do not matter.
+# ---- accuracy against computing time
+
+LONG_SUM_ROUND_OFF = 1e-9  # largest relative error that counts as round-off in long sums
+# Smallest ratio of the errors with finer and coarser steps at which the steps do not matter
 INEFFECTIVE_STEPS_ERROR_RATIO = 0.9
 
 

@@ -1,21 +1,24 @@
 """Plan of a scene before it is run: engine, sizes, stiffnesses and dimensionless groups, and the memory of the run.
 
-In: a Scene or a Model. Out: a `Plan`. Nothing is solved, except for the contact search by which an
-automatic mesh is graded, and for the patch of a joint that was bolted when the modes were measured.
-`refuse_insufficient_memory` compares the memory that a run needs with the free memory and the limit of the scene.
+In: a Scene or a Model. Out: a `Plan`. Nothing is solved, except for the contact search by which an automatic mesh is graded,
+and for the patch of a joint that was bolted when the modes were measured. Read `_make_plan` first. The second part adds up
+the memory of the run (`list_memory_parts`), and refuses a run that needs more than is free or than the scene allows.
 """
 
+import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .. import friction, inputs
-from ..core import PatchfemError, add_interface_number
+from .. import friction, inputs, structure
+from ..core import Missing, PatchfemError, add_interface_number
 from ..effects import EFFECTS, law_has_trait
 from ..model.model import Model, build
 from ..model.source import locate_errors
 from ..scene import refuse_attribute
-from . import joint
+from . import joint, refine
 from .bench import engine as of_bench
 from .patch import plan as patch_plan
 from .results.patch_rows import Values
@@ -24,16 +27,8 @@ from .rig import plan as of_rig
 
 if TYPE_CHECKING:
     from ..model.rig import BoltedJoint
-import os
-from collections.abc import Callable
-from pathlib import Path
-from typing import NamedTuple
 
-from .. import structure
-from ..core import Missing
-from . import refine
-
-DIMENSIONLESS_GROUPS = {  # Definition and SI unit of each group.
+DIMENSIONLESS_GROUPS = {  # definition and SI unit of each group by its name
     "D": (
         "D: friction limit (static, if there are two) divided by the largest force of the drive, both on the first mode",
         "1",
@@ -208,7 +203,7 @@ def _make_plan(model: Model) -> Plan:
                 patch_plan.describe_shear(interface.patch, slip_length, rig.friction.names[number])
             )
 
-    # Sizes of the computation, by which time and memory are predicted.
+    # Numbers of unknowns and samples, from which the memory follows.
     unknowns = {}
     if model.patch is not None or model.has_interface_patches:
         unknowns = patch_plan.count_unknowns(model)
@@ -300,14 +295,16 @@ def _describe_grooves(model: Model) -> list[str]:
     ]
 
 
-BYTES_PER_STATIC_NODE = 4.6e3  # per node of the pieces of a static patch, to condense them [bytes]
-BYTES_PER_MOVING_NODE = 8.1e3  # the same, with the frames of a motion [bytes]
-BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide [bytes]
-# Per pair of modes: matrices, mode shapes and eigenvalue solver [bytes]
+# ---- memory of a run
+
+BYTES_PER_STATIC_NODE = 4.6e3  # per node of the pieces of a static patch, to condense them
+BYTES_PER_MOVING_NODE = 8.1e3  # the same, with the frames of a motion
+BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide
+# Bytes per entry of an n x n array of n modes, of which there are matrices, mode shapes and those of the eigenvalue solver
 BYTES_PER_MODE_PAIR = 125.0
-BYTES_PER_DRIVE_ROW = 400.0  # per row of a recorded drive [bytes]
-HYBRID_SAMPLES_PER_STORED_CYCLE = 400  # stored samples of a cycle of the engine `hybrid`
-# Expected number of reversals per cycle, which are also stored for the cycles before the window.
+BYTES_PER_DRIVE_ROW = 400.0  # per row of a recorded drive
+HYBRID_SAMPLES_PER_STORED_CYCLE = 400  # samples that the engine `hybrid` stores of a cycle
+# Expected reversals per cycle, which are stored also for the cycles before the window
 REVERSALS_PER_CYCLE = 4.0
 
 
@@ -345,7 +342,7 @@ HISTORY_BYTES = {
 }
 
 
-def list_parts(plan: Plan) -> list[MemoryPart]:
+def list_memory_parts(plan: Plan) -> list[MemoryPart]:
     """Return the contributions to the memory of a run, from the largest to the smallest."""
     model = plan.model
     points = plan.unknowns.get("interface_points", 0)
@@ -373,11 +370,11 @@ def list_parts(plan: Plan) -> list[MemoryPart]:
         size = BYTES_PER_SLIDE_SAMPLE * plan.samples
         parts.append(MemoryPart(size, f"{plan.samples} samples of the slide", remedy))
     elif model.rig is not None:
-        parts += _list_parts_of_motion(plan, has_steps=has_steps)
+        parts += _list_memory_parts_of_motion(plan, has_steps=has_steps)
     return sorted(parts, reverse=True)
 
 
-def _list_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
+def _list_memory_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
     """Return the contributions of the modes, the drive and the stored histories of a rig to its memory.
 
     `has_steps` tells whether the scene sets the steps per cycle. Lists of bonds are not counted, because their length is
@@ -495,7 +492,8 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     Missing
         With the largest contribution and its remedy.
     """
-    parts = list_parts(plan)
+    # A run that fits into what is free and allowed goes on without a word.
+    parts = list_memory_parts(plan)
     total = sum(part.bytes for part in parts)
     free = free_bytes()
     given = plan.model.accuracy.max_memory
@@ -507,6 +505,8 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     if total > free:
         limit = f"only {max(free, 0.0) / 1e9:.2g} GB are free"
         other_remedy = ""
+
+    # A remedy is named for the largest part that the scene determines, if it is a noticeable one.
     text = f"about {total / 1e9:.3g} GB of memory are needed, but {limit}"
     largest = next(part for part in parts if part.remedy)
     if largest.bytes < 0.1 * total:
@@ -514,6 +514,7 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     else:
         size = f"{largest.bytes / 1e9:.3g} GB"
         text += f"; {size} of these are for {largest.what}: {largest.remedy}{other_remedy}"
+
     if total > free or given is not None:
         raise Missing(text, "")
     if say is not None:

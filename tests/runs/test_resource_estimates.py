@@ -85,7 +85,7 @@ DRIVE_REMEDY = "give fewer rows in drive.file, or lower drive.duration"
 
 def _find_largest(scene):
     """Return the largest contribution that the scene determines."""
-    return next(part for part in memory.list_parts(plan(scene)) if part.remedy)
+    return next(part for part in memory.list_memory_parts(plan(scene)) if part.remedy)
 
 
 def test_exact_free_memory_of_control_groups(tmp_path):

@@ -20,6 +20,7 @@ from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws import make_law, masing
 from patchfem.hybrid.records import LawNumbers
 from patchfem.model import make_bond_parameters
+from patchfem.runs import estimate_hybrid_errors
 
 # Names of the rigs are the seeds by which they were drawn.
 RIGS = json.loads(Path(__file__).with_suffix(".json").read_text("utf-8"))
@@ -49,7 +50,7 @@ def make_case(spec: dict, rtol: float = cases.DEFAULT_RTOL, n_steps: float = cas
     modes = ModalBasis(
         names, omega, columns["zeta"], slides[0], columns["base"], columns["output"], spec["mass"], faces=slides
     )  # fmt: skip
-    if spec["rows"] is not None:
+    if spec["rows"]:
         signal = drives.make_record(*map(np.array, spec["rows"]), spec["period"])
     else:
         repeat = 1 if len(spec["tones"]) == 1 else 0
@@ -75,7 +76,7 @@ def compare_with_reference(spec: dict, true: dict) -> dict:
     rtol = cases.DEFAULT_RTOL
     values = runs.run_case(make_case(spec)).values
     coarse = make_case(spec, runs.COARSE * rtol, cases.MIN_STEPS / runs.COARSE_STEP)
-    errors = runs.estimate_errors(values, runs.run_case(coarse).values, rtol)
+    errors = estimate_hybrid_errors(values, runs.run_case(coarse).values, rtol)
     sizes = {
         "relative_displacement_amplitude": spec["length"],
         "absolute_acceleration_peak": spec["acceleration"],

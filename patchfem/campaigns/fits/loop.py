@@ -152,7 +152,7 @@ class LoopComparison(Comparison):
         return SharedMeshes(models)
 
     def measure_step_change(self, values: Sequence[float]) -> np.ndarray:
-        """Return the change (k,) of the computed reading when the time steps are halved."""
+        """Return the change (k,) of the reading that follows from fitted `values` when the time steps are halved."""
         coarse = self.compute(values)
         self.steps_per_row *= 2
         fine = self.compute(values)

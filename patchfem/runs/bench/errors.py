@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import slip
+from ... import friction, slip
 from ...effects import law_has_trait
 from ...response.errors import (
     CoarserRuns,
@@ -46,7 +46,7 @@ class CoarseRun(NamedTuple):
 
     steps: int
     level: int
-    choice: object
+    choice: "friction.bonds.engines.EngineChoice"
     modes: int | None = None
     has_half_cells: bool = False
 

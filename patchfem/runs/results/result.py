@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import response
-from ...core import Outcome, add_interface_number, remove_interface_number
+from ...core import Outcome, Response, add_interface_number, remove_interface_number
 from ...formatting import rewrite_powers_of_ten
 from ...scene import refuse_attribute
 from . import patch_rows
@@ -50,19 +50,9 @@ class Advice(NamedTuple):
     axis: str = ""
 
     @classmethod
-    def set_key(cls, key: str, value: float, more: str = "") -> "Advice":
-        """Return the advice to set a key to a number.
-
-        Parameters
-        ----------
-        key : str
-            Key as the scene writes it, "table.key".
-        value : float
-            Number in the unit of the key.
-        more : str
-            Words that follow the value.
-        """
-        return cls(f"set {key} = {value}{more}", key, value)
+    def set_key(cls, key: str, value: float) -> "Advice":
+        """Return the advice to set a key, "table.key", to a number in the unit of the key."""
+        return cls(f"set {key} = {value}", key, value)
 
 
 class Finding(NamedTuple):
@@ -198,11 +188,11 @@ class MotionData(NamedTuple):
 
     period: float | None = None
     energies: Values = MappingProxyType({})
-    step_runs: tuple = ()
-    levels: tuple = ()
-    events: object = None
-    decay: object = None
-    spectra: object = None
+    step_runs: "tuple[response.errors.StepRun, ...]" = ()
+    levels: "tuple[response.events.Level, ...]" = ()
+    events: "response.events.Events | None" = None
+    decay: "response.decay_curve.DecayCurve | None" = None
+    spectra: "response.stationary.Spectra | None" = None
     steady: SteadyData | None = None
 
 
@@ -247,8 +237,8 @@ class Result:
     notes: list[str] = field(default_factory=list)
     patch: object = None
     fields: Arrays = field(default_factory=dict)
-    response: object = None
-    window: object = None
+    response: Response | None = None
+    window: Response | None = None
     settings: Settings = field(default_factory=Settings)
     motion: MotionData = field(default_factory=MotionData)
     wear: WearHistory | None = None

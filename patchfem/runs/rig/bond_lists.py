@@ -44,14 +44,14 @@ def choose_bond_summation(model: Model, numerics: Numerics):
     if numerics.choice is not None:
         return numerics.choice
     choices = []
-    for number, part in enumerate(_list_parts(model)):
+    for number, part in enumerate(_split_by_interface(model)):
         if sums_over_lists(part):
             choices.append(_choose_summation(part, numerics, number))
     return min(choices, key=lambda choice: choice.merge, default=engines.RECURSION)
 
 
-def _list_parts(model: Model) -> list[Model]:
-    """Return a model with the law and the load of each interface, or the model itself if it has only one."""
+def _split_by_interface(model: Model) -> list[Model]:
+    """Return a model for each interface, with its law and load; for a single interface the model itself."""
     interfaces = model.rig.friction.interfaces
     if len(interfaces) < 2:
         return [model]
@@ -62,11 +62,11 @@ def _list_parts(model: Model) -> list[Model]:
     return parts
 
 
-def has_bond_list(model: Model, numerics: Numerics) -> bool:
+def has_bond_list(model: Model) -> bool:
     """Return whether an interface needs a list of all bonds that have formed, over which its force is summed."""
     if model.friction is None:
         return False
-    return any(map(sums_over_lists, _list_parts(model)))
+    return any(map(sums_over_lists, _split_by_interface(model)))
 
 
 def _choose_summation(model: Model, numerics: Numerics, number: int):
@@ -163,18 +163,21 @@ def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
     meaningless, and every step would leave permanent bonds, so that the CPU time would increase
     with the square of the number of steps.
     """
-    if not has_bond_list(model, numerics) or model.partial_slip:
+    if not has_bond_list(model) or model.partial_slip:
         return
+
+    # Highest frequency of the block on the bonds of one interface, with the mass that this interface moves
     modes = model.rig.modes
     drive = model.rig.drive.signal
     omega = 0.0
     for part, interface, row in zip(
-        _list_parts(model), model.rig.friction.interfaces, modes.interfaces
+        _split_by_interface(model), model.rig.friction.interfaces, modes.interfaces
     ):
         if sums_over_lists(part) and not interface.partial_slip:
             f = part.friction
             mobility = float((row**2).sum()) / modes.mass
             omega = max(omega, sqrt(f.static * part.nominal_load / f.bond_length * mobility))
+
     phase = omega * drive.period / numerics.steps
     if phase > MAX_BOND_VIBRATION_PHASE:
         wanted = ceil(omega * drive.period)

@@ -42,6 +42,8 @@ def make_contact(model: Model, numerics, patch):
     """
     rig = model.rig
     rows = rig.modes.interfaces
+
+    # Nonlinear springs are points too, which follow the interfaces.
     springs = []
     if rig.springs.interlock is not None:
         law = laws.make_interlocking(*rig.springs.interlock)
@@ -50,6 +52,7 @@ def make_contact(model: Model, numerics, patch):
         law = laws.make_cubic(rig.springs.cubic)
         springs.append(PointSet(law, rig.modes.output, is_spring=True))
 
+    # Parallel elements represent an interface exactly under a constant load; its nodes or shear modes serve all other cases.
     fields = {}
     sets = []
     if rig.friction.interfaces:
@@ -62,7 +65,7 @@ def make_contact(model: Model, numerics, patch):
             surfaces = _list_surfaces(model, numerics, patch)
             halves = {"has_half_cells": numerics.has_half_cells}
             surfaces = [part._replace(**halves) for part in surfaces]
-            if bond_lists.has_bond_list(model, numerics):
+            if bond_lists.has_bond_list(model):
                 choice = bond_lists.choose_bond_summation(model, numerics)
                 sums = [make_bond_sum(model, part.keys, choice) for part in surfaces]
                 surfaces = [part._replace(bond_sum=one) for part, one in zip(surfaces, sums)]
@@ -70,6 +73,7 @@ def make_contact(model: Model, numerics, patch):
             count = numerics.shear_modes
             sets = [make_points(model, part, count, moves=moves) for part in surfaces]
 
+    # Without friction the drive gives the scale of the forces.
     limit = sum(float(point_set.law.limits.sum()) for point_set in sets)
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     if model.grooves is not None:
@@ -138,6 +142,7 @@ def _list_surfaces(model: Model, numerics, patch) -> list[Surface]:
         surface = Surface(keys, total, force, soft, rows[0], limits=limits)
         return [place_surface(model, patch, surface)]
 
+    # Between masses only a patch whose shape matters to the motion is pressed; any other is a point.
     surfaces = []
     for k, interface in enumerate(rig.friction.interfaces):
         load = model.point.load if interface.load is None else interface.load

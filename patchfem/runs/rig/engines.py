@@ -13,12 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import hybrid, slip
+from ... import friction, hybrid, slip
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
 from ...response.errors import (
     CoarserRuns,
     ComparisonRuns,
+    absolute_change,
     convergence_errors,
     edge_errors,
     estimate_sampling_errors,
@@ -106,7 +107,7 @@ def list_runs_with_other_modes(model: Model, numerics) -> ComparisonRuns:
     return [CoarserRuns(runs, finer_errors, beside, "reduced")]
 
 
-def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> list:
+def _list_coarse_meshes(model: Model, numerics, *, has_coarse_patch: bool) -> list["Numerics"]:
     """List numerical settings in which one patch of a model has a coarser mesh: that of [contact], or of an interface.
 
     Interfaces with equal patches are coarsened together.
@@ -237,12 +238,14 @@ def _list_hybrid_time_runs(model: Model, numerics) -> ComparisonRuns:
 
     `numerics` are the settings of the run whose errors are estimated.
     """
-    coarse = replace(
-        numerics,
-        local=hybrid.runs.COARSE * numerics.local,
-        steps=numerics.steps / hybrid.runs.COARSE_STEP,
-    )
+    coarse = enlarge_hybrid_steps(numerics)
     return [CoarserRuns((coarse,), partial(estimate_hybrid_errors, rtol=numerics.local))]
+
+
+def enlarge_hybrid_steps(numerics):
+    """Return the settings of the engine `hybrid` with a larger step tolerance and longer steps, for a comparison run."""
+    local = hybrid.runs.COARSE * numerics.local
+    return replace(numerics, local=local, steps=numerics.steps / hybrid.runs.COARSE_STEP)
 
 
 def estimate_hybrid_errors(values: Values, coarse_values: Values, rtol: float) -> Values:
@@ -255,8 +258,10 @@ def estimate_hybrid_errors(values: Values, coarse_values: Values, rtol: float) -
     rtol : float
         Step tolerance of the run.
     """
-    shared = {name: value for name, value in values.items() if name in coarse_values}
-    return hybrid.runs.estimate_errors(shared, coarse_values, rtol)
+    errors = {}
+    for name, change in absolute_change(values, coarse_values).items():
+        errors[name] = hybrid.runs.estimate_error(change, values[name], rtol)
+    return errors
 
 
 def _list_hybrid_space_runs(model: Model, numerics, patch, n_coarse, solution) -> ComparisonRuns:
@@ -383,7 +388,7 @@ class Numerics:
     cycles: float
     window: int
     shear_modes: int | None
-    choice: object = None
+    choice: "friction.bonds.engines.EngineChoice | None" = None
     whole: bool = True
     local: float = 0.0
     other_rig: int | None = None

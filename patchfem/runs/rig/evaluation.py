@@ -5,7 +5,7 @@ more accurately than from samples. If the amplitude of the drive changes in leve
 level: there is a `Level` with errors for each of them, the onset level found by bisection, and the joined run.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -59,8 +59,7 @@ class Solution:
     - contact: contact model of the run.
     - prepare: CPU time of each part of the preparation [s].
     - message: reason of an early end.
-    - levels, run_level: Level of each drive level, and a function that runs another level, see
-      `levels.find_onset`.
+    - levels, run_level: Level of each drive level, and a function that runs another level (`find_onset`).
     - log: events of an event-driven engine.
     - notes: warnings of the engine.
     - stick_tolerance: largest slip per cycle [m] at which the interface counts as stuck.
@@ -88,13 +87,13 @@ class Solution:
     prepare: Values | None = None
     message: str = ""
     levels: tuple[Level, ...] = ()
-    run_level: object = None
+    run_level: Callable[[int, float], Level] | None = None
     log: Events | None = None
     notes: tuple[str, ...] = ()
     stick_tolerance: float = 0.0
     run_errors: Values = field(default_factory=dict)
     errors: Values | None = None
-    bond_summation: object = None
+    bond_summation: "friction.bonds.engines.EngineChoice | None" = None
     coarser: "tuple[tuple[Solution, Solution | None], ...]" = ()
     extremes: np.ndarray | None = None
     phasors: np.ndarray | None = None
@@ -279,10 +278,10 @@ def add_level_errors(
 
 
 class Onset(NamedTuple):
-    """Drive level of an onset, from a bracket of two levels [m s-2].
+    """Drive level of an onset, which lies between two levels of a bisection.
 
-    - level: middle of the bracket
-    - error: half its width
+    - level: mean of both levels [m s-2].
+    - error: half their difference [m s-2].
     """
 
     level: float

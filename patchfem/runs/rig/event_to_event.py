@@ -15,8 +15,7 @@ from ...convergence import convergence_error
 from ...core import NotConverged, Outcome, Response
 from ...hybrid import cases
 from ...hybrid import runs as engine
-from ...hybrid.laws import is_rigid
-from ...hybrid.laws.masing import has_stick
+from ...hybrid.laws import is_rigid, masing
 from ...hybrid.measures import compute_energies
 from ...hybrid.records import Margin, Memory, State, Status
 from ...response.errors import ERROR_MEASURES, absolute_change
@@ -297,7 +296,8 @@ class LumpedEvaluator(RunEvaluator):
 
         None for laws that have no such events, because some part of them always slips.
         """
-        have_elements = self.joints.laws and all(has_stick(law) for law, _ in self.joints.laws)
+        laws = [law for law, _ in self.joints.laws]
+        have_elements = laws and all(masing.has_stick(law) for law in laws)
         if not (self.is_rigid or have_elements):
             return None
         directions = motion.find_directions()
@@ -463,6 +463,7 @@ def choose_sample_times(numerics, drive, cycles: float, frames: int = 0) -> Samp
     numerics : Numerics
         Number of cycles of the window, and whether the histories before it are stored.
     drive : drives.DriveSignal
+        Drive, whose period divides the run into cycles.
     cycles : float
         Number of cycles of the drive in the run.
     frames : int

@@ -16,8 +16,7 @@ from ...core import PatchfemError
 from ...effects import law_has_trait, law_supports
 from ...hybrid import laws as hybrid_laws
 from ...hybrid.cases import Load, UndrivenRig, list_interfaces
-from ...hybrid.laws.grooves import make_grooves
-from ...hybrid.laws.masing import from_elements, has_many_elements, with_all_reversals
+from ...hybrid.laws import grooves, masing
 from ...hybrid.records import LawNumbers
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
@@ -85,7 +84,7 @@ class Joint(NamedTuple):
     def make_hybrid_law(self) -> LawNumbers:
         """Return the law as LawNumbers, the form for the engine `hybrid`, which integrates from event to event."""
         if self.stiffness is not None:
-            return from_elements(self.stiffness, self.yields)
+            return masing.from_elements(self.stiffness, self.yields)
         load = self.load
         return hybrid_laws.make_law(self.law.law, self.make_law(), load.mean, varies=load.varies)
 
@@ -118,7 +117,7 @@ class Joints(NamedTuple):
     @property
     def has_kinks(self) -> bool:
         """Whether a law has elements that yield at several displacements."""
-        return any(has_many_elements(law) for law, _ in self.laws)
+        return any(masing.has_many_elements(law) for law, _ in self.laws)
 
     @property
     def springs(self) -> np.ndarray:
@@ -239,7 +238,7 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
         law = joint.make_hybrid_law() if model.grooves is None else _make_groove_law(model, joint)
         if joint.stiffness is not None and rig.drive.kind == "free":
             # Decay curves are measured at the extremes of the output.
-            law = with_all_reversals(law)
+            law = masing.with_all_reversals(law)
         laws.append(law)
 
     is_soft = any(joint.stiffness is not None for joint in joints)
@@ -256,12 +255,12 @@ def _make_groove_law(model: Model, joint: Joint) -> LawNumbers:
     slide = model.rig.modes.slide
     mass = model.rig.modes.mass / float(slide @ slide)
     model.grooves.check_lifted_mass(model.friction.static, mass)
-    return make_grooves(joint.law, model.grooves)
+    return grooves.make_grooves(joint.law, model.grooves)
 
 
 def _find_spring_stiffness(law: LawNumbers) -> float:
     """Return the stiffness [N/m] of a law that is a single element in stick, or nan for other laws."""
-    if law.law != "masing" or law.numbers[1] >= 0 or has_many_elements(law):
+    if law.law != "masing" or law.numbers[1] >= 0 or masing.has_many_elements(law):
         return np.nan
     limit, length = law.numbers[2:4]
     return limit / length

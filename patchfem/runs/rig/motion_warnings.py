@@ -62,12 +62,15 @@ def collect_law_facts(run, settings: Settings) -> LawFacts:
     """Return what the warnings and notes on a friction law need: law, patch, measures, forces and energies of a run."""
     model = run.model
     solution = run.solution
+
+    # A limit that varies with the load cannot be compared with the largest force.
     limit = 0.0
     if run.has_friction:
         limit = model.friction.static * first_interface_load(model, run.patch)
     force_ratio = None
     if limit > 0 and not model.rig.friction.load_varies:
         force_ratio = float(np.abs(solution.response.force).max()) / limit
+
     return LawFacts(
         model=model,
         patch=run.patch,

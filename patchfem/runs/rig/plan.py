@@ -107,7 +107,7 @@ def count_unknowns(model: Model) -> dict[str, int]:
     if numerics.engine != "march" or f is None:
         return counts
     has_bonds = model.grooves is None and law_has_trait(f.law, "bonds")
-    if has_bonds and bond_lists.has_bond_list(model, numerics):
+    if has_bonds and bond_lists.has_bond_list(model):
         return counts
     is_changed = has_bonds or model.grooves is not None or model.rig.friction.load_varies
     if model.partial_slip and is_changed:

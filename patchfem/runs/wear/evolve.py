@@ -446,7 +446,7 @@ def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMo
     model = motion.model
     worn = make_worn_model(model, patch, state.depth)
     measures = compute_values(patch) | motion.last.values
-    measures |= compute_worn_volume_and_depth(model.patch, patch, state.depth)
+    measures |= compute_worn_volume_and_depth(patch, state.depth)
 
     # Wear changes the grooves and, by a table, the friction law.
     if model.grooves is not None:
@@ -467,18 +467,8 @@ def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMo
     )
 
 
-def compute_worn_volume_and_depth(patch_model, patch, depth) -> Values:
-    """Return a dict of the worn volume [m3] and the largest worn depth [m] of a patch.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Model of the patch.
-    patch : Patch
-        Patch on whose nodes the depth is given.
-    depth : (m,)
-        Worn depth [m].
-    """
+def compute_worn_volume_and_depth(patch, depth) -> Values:
+    """Return the worn volume [m3] and the largest worn depth [m] of a patch by name, for the depth (m,) [m] at its nodes."""
     return {
         "worn_volume": float(np.vdot(depth, patch.pieces.interface.weight)),
         "worn_depth_max": float(depth.max(initial=0.0)),

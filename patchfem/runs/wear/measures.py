@@ -212,7 +212,7 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool =
     values = {name: last.values[name] for name in jump_errors}
     coarse = []
     for patch, depth in zip(evolved.coarse, evolved.depths):
-        coarse.append(compute_worn_volume_and_depth(model.patch, patch, depth))
+        coarse.append(compute_worn_volume_and_depth(patch, depth))
     mesh_errors = convergence_errors(values, *coarse) if coarse else {}
 
     # The errors of jumps, slip path, mesh, round-off and earlier run add up.

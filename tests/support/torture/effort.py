@@ -30,7 +30,7 @@ def estimate_seconds(plan) -> float:
         numerics = choose_numerics(model)
         step = STEP_SECONDS + POINT_STEP_SECONDS * n_points
         motion = MARCH_PASSES * numerics.cycles * numerics.steps * step
-        if is_stuck_by_printed_law(model) and has_bond_list(model, numerics):
+        if is_stuck_by_printed_law(model) and has_bond_list(model):
             # One strip per step, in the list of each node.
             strips = max(n_points, 1) * numerics.cycles * numerics.steps
             motion *= 1 + LIST_STRIP_STEP_SECONDS * strips / 2 / step

@@ -237,7 +237,7 @@ def note_end_of_curve(points: list[CurvePoint], ended: str, last: float) -> list
     points : list of CurvePoint
         Points of the curve.
     ended : str
-        Why it ends, see `hybrid.continuation.CurvePath`.
+        Key of REASONS_OF_END, or "end".
     last : float
         Last frequency of the sweep [Hz].
     """
@@ -438,10 +438,9 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
 
 
 def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> Values:
-    """Return the differences of all measures between a curve point and a Solution.
+    """Return by how much each measure at a curve point differs from that at the peak; {} without a steady motion there.
 
-    `finder` computes steady motions, `neighbour` is the curve point with drive and first guess, and `solution` the
-    motion at the peak. The result is {} if the point has no steady motion.
+    `finder` computes the motion of the point `neighbour` from its drive and guess; `solution` is the motion at the peak.
     """
     try:
         other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)

@@ -15,7 +15,6 @@ from .... import compiled
 from ....core import NotConverged, Outcome, PatchfemError, SineDrive
 from ....formatting import format_length
 from ....hybrid import cases, periodic
-from ....hybrid import runs as hybrid_runs
 from ....hybrid.continuation import PathPoint, PathSettings
 from ....hybrid.laws import is_rigid, masing
 from ....hybrid.periodic_curves import CurveStart, PeriodEquations, measure_distance
@@ -25,7 +24,7 @@ from ....response.rows import AMPLITUDE
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
 from ...results.result import Settings, SteadyData
-from ..engines import estimate_hybrid_errors, may_fold
+from ..engines import enlarge_hybrid_steps, estimate_hybrid_errors, may_fold
 from ..evaluation import Solution
 from ..event_to_event import LumpedEvaluator
 from ..joints import make_joints
@@ -110,6 +109,7 @@ class ShootingFinder:
         NotConverged
             If no motion is found that repeats after each cycle.
         """
+        # A damped motion whose stability does not matter follows from its guess in a few periods; any other is searched.
         case = self.make_case(drive)
         is_undamped = self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL
         if guess is None or needs_stability or is_undamped:
@@ -124,6 +124,8 @@ class ShootingFinder:
             motion = periodic.follow_periodic_motion(case, guess)
         if motion.grows:
             return motion
+
+        # The motion must repeat, as closely as its caller needs it.
         tolerance = motion.tolerance
         if not needs_stability:
             tolerance = max(tolerance, periodic.MAX_KINKED_CHANGE)
@@ -282,11 +284,7 @@ class ShootingFinder:
         is_stuck : bool
             Whether the interface sticks all the time.
         """
-        coarse = replace(
-            self.numerics,
-            local=hybrid_runs.COARSE * RTOL,
-            steps=cases.MIN_STEPS / hybrid_runs.COARSE_STEP,
-        )
+        coarse = enlarge_hybrid_steps(self.numerics)
         other = LumpedEvaluator(self.model, coarse, self.patch, self.joints)
         start = None if motion.grows else motion.run.final
         other_run = other.resume(drive, run.cycles_done, start, 0)
@@ -338,7 +336,7 @@ class ShootingFinder:
         guess : PeriodicMotion, optional
             Neighbouring motion; from rest by default.
         needs_stability : bool
-            Whether stability and errors are needed, as in `find_periodic_motion`.
+            Whether the multipliers and the errors of the motion are needed.
         """
         # Two motions need no search: that of a linear rig, and that of a mass that leaves its grooves.
         is_linear = not (self.joints.laws or self.model.rig.springs.is_nonlinear)
