@@ -1,4 +1,4 @@
-"""Numbers of the laws of contact points, and the columns of their memory."""
+"""Laws of contact points, and the columns of their numbers and of their memory."""
 
 from enum import IntEnum
 
@@ -21,6 +21,27 @@ class Law(IntEnum):
     BOUC_WEN = 4
     LUGRE = 5
     BONDS = 6
+
+
+class LawNumber(IntEnum):
+    """Columns of the numbers of a law, of which column 0 has the `Law`; LUGRE has those of `LuGreNumber`.
+
+    - LIMIT: friction limit [N], of COULOMB the static one
+    - KINETIC: kinetic limit of COULOMB [N]
+    - SPEED: reference speed of TANH [m/s]
+    - LENGTH: length of JENKINS, BOUC_WEN and BONDS, and phi_max of MASING [m]
+    - CHI, BETA: parameters of MASING
+    - EXPONENT, SHAPE: parameters of BOUC_WEN
+    """
+
+    LIMIT = 1
+    KINETIC = 2
+    SPEED = 2
+    LENGTH = 2
+    CHI = 3
+    BETA = 4
+    EXPONENT = 3
+    SHAPE = 4
 
 
 class Memory(IntEnum):

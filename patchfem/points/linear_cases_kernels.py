@@ -25,7 +25,7 @@ from .case_observers_kernels import (
     store_instant,
 )
 from .case_rows import MAX_STEP_PHASE, MAX_STEPS, Now, Number, Seen
-from .law_rows import Law
+from .law_rows import Law, LawNumber
 
 MAX_ROOT_STEPS = 60  # Newton steps and bisections for an event
 ROOT_TOLERANCE = 1e-13  # error of the instant of an event, relative to the step
@@ -193,10 +193,10 @@ def make_point(case, numbers):
     numbers : (k,) array
         Numbers of the law.
     """
-    limit = numbers[1]
+    limit = numbers[LawNumber.LIMIT]
     if numbers[0] == Law.COULOMB:
-        return Point(limit, numbers[2], 0.0, case[Number.MOBILITY])
-    return Point(limit, limit, limit / numbers[2], case[Number.MOBILITY])
+        return Point(limit, numbers[LawNumber.KINETIC], 0.0, case[Number.MOBILITY])
+    return Point(limit, limit, limit / numbers[LawNumber.LENGTH], case[Number.MOBILITY])
 
 
 @njit(**NJIT_KERNEL)

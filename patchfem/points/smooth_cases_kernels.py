@@ -27,7 +27,7 @@ from .case_observers_kernels import (
     store_instant,
 )
 from .case_rows import Now, Number, Seen
-from .law_rows import Law, Memory
+from .law_rows import Law, LawNumber, Memory
 from .smooth_laws_kernels import (
     PointLaw,
     Step,
@@ -235,8 +235,8 @@ def find_longest_step(first, tangent, body):
         speed = numbers[LuGreNumber.SPEED]
     else:
         # The velocity relaxes at this rate to the one that the drive keeps up.
-        limit = numbers[1]
-        speed = numbers[2]
+        limit = numbers[LawNumber.LIMIT]
+        speed = numbers[LawNumber.SPEED]
         rate = mobility * limit / speed * (1 - (first.force / limit) ** 2)
         dt = 2 * grade / (rate + case[Number.OMEGA])
     # A law of the velocity is flat far above its speed, down to which the velocity may fall in a few steps.

@@ -2,19 +2,8 @@
 
 `find_force` follows the law of a point along the path of a step, exactly for laws of the path. The memory goes on to the end
 of the step if the step is accepted. The other functions tell where a step ends and which part of it is slip. The memory of
-each law begins with `Memory`. A law is a number in `Law` with a branch in these functions.
-
-============= ================================================================ ==============================
-law           numbers from 1 on                                                further memory
-============= ================================================================ ==============================
-TANH          limit [N], v_0 [m/s]
-MASING        limit [N], phi_max [m], chi, beta                                see `Masing`
-BOUC_WEN      limit [N], length [m], exponent n, shape s
-LUGRE         see `friction.laws.lugre_kernels.LuGreNumber`
-BONDS         limit [N], length [m]                                            mean squared stretch / length^2
-============= ================================================================ ==============================
-
-COULOMB (static and kinetic limit [N]) and JENKINS (limit [N], length [m]) belong to `linear_cases_kernels`.
+each law begins with `Memory`; that of parallel sliders goes on with `Masing`. A law is a number in `Law` with a branch in
+these functions, and its numbers are those of `LawNumber`. COULOMB and JENKINS belong to `linear_cases_kernels`.
 """
 
 from math import exp, inf, sqrt
@@ -28,7 +17,7 @@ from ..friction.bonds.point_kernels import shape_functions
 from ..friction.laws.bouc_wen_kernels import follow_path
 from ..friction.laws.lugre_kernels import LuGreNumber, relaxation_length
 from ..friction.laws.lugre_kernels import find_force as find_bristle_force
-from .law_rows import Law, Masing, Memory
+from .law_rows import Law, LawNumber, Masing, Memory
 
 CORNER_TOLERANCE = 1e-5  # smallest path to a corner relative to that of its branch
 MIN_HALF_PATH = 0.1  # shortest path of the bristles in half of a step, or in the other, relative to that of the step
@@ -84,7 +73,9 @@ def find_force(law, step, commits):
     Parameters
     ----------
     law : PointLaw
+        Law of the point; its memory is changed if `commits`.
     step : Step
+        Step of the point.
     commits : bool
         Whether the memory goes on to the end of the step.
     """
@@ -92,16 +83,16 @@ def find_force(law, step, commits):
     memory = law.memory
     if numbers[0] == Law.TANH:
         # tanh x = 1 - 2/(exp(2 x) + 1), in two thirds of the time and to the same fraction of the limit
-        growth = exp(2 * step.end_velocity / numbers[2])
-        return numbers[1] * (1 - 2 / (growth + 1))
+        growth = exp(2 * step.end_velocity / numbers[LawNumber.SPEED])
+        return numbers[LawNumber.LIMIT] * (1 - 2 / (growth + 1))
     if numbers[0] == Law.LUGRE:
         return follow_bristles(law, step, commits)
     if numbers[0] == Law.MASING:
         return follow_sliders(law, step.increment, commits)
 
     # Stretch along the motion relative to the length, and its mean square over the bonds
-    limit = numbers[1]
-    length = numbers[2]
+    limit = numbers[LawNumber.LIMIT]
+    length = numbers[LawNumber.LENGTH]
     direction = 1.0 if step.increment > 0 else -1.0
     path = abs(step.increment) / length
     z = direction * memory[Memory.STRETCH] / length
@@ -110,7 +101,7 @@ def find_force(law, step, commits):
         end = 1 - (1 - z) * decay
         square = 2 + (memory[Memory.SQUARE] - 2 - 2 * (1 - z) * path) * decay
     else:
-        end = follow_path(z, path, numbers[3], numbers[4]).end
+        end = follow_path(z, path, numbers[LawNumber.EXPONENT], numbers[LawNumber.SHAPE]).end
         square = end * end
     if commits:
         memory[Memory.STRETCH] = direction * length * end
@@ -129,7 +120,9 @@ def follow_bristles(law, step, commits):
     Parameters
     ----------
     law : PointLaw
+        Law of the point; its memory is changed if `commits`.
     step : Step
+        Step of the point.
     commits : bool
         Whether the memory goes on to the end of the step.
     """
@@ -167,10 +160,10 @@ def follow_bristles(law, step, commits):
 @njit(**NJIT_KERNEL)
 def _load_first(numbers, x):
     """Return the `Loading` of Segalman's sliders (2005, eq. 22) to x >= 0 [m], by their `numbers` (k,)."""
-    limit = numbers[1]
-    length = numbers[2]
-    order = numbers[3] + 1
-    beta = numbers[4]
+    limit = numbers[LawNumber.LIMIT]
+    length = numbers[LawNumber.LENGTH]
+    order = numbers[LawNumber.CHI] + 1
+    beta = numbers[LawNumber.BETA]
     ratio = min(x / length, 1.0)
     scale = limit / (beta + order / (order + 1))
     power = ratio
@@ -199,8 +192,8 @@ def follow_sliders(law, dq, commits):
     """
     numbers = law.numbers
     memory = law.memory
-    limit = numbers[1]
-    length = numbers[2]
+    limit = numbers[LawNumber.LIMIT]
+    length = numbers[LawNumber.LENGTH]
     direction = 1.0 if dq > 0 else -1.0
     q = memory[Masing.SLIDE]
     force = memory[Masing.FORCE]
@@ -302,7 +295,7 @@ def find_branch(first, law):
         return Branch(first.slide, direction, 1.0, inf)
 
     # A branch after a turn is twice as long as the first loading.
-    length = numbers[2] if n == 0 and not turns else 2 * numbers[2]
+    length = numbers[LawNumber.LENGTH] if n == 0 and not turns else 2 * numbers[LawNumber.LENGTH]
     start = memory[Masing.STACK + 2 * n - 2] if n > 0 else 0.0
     if turns:
         start = memory[Masing.SLIDE]
@@ -318,22 +311,25 @@ def find_first_tangent(numbers):
         return 0.0
     if law == Law.LUGRE:
         return numbers[LuGreNumber.STIFFNESS]
-    stiffness = numbers[1] / numbers[2]
+    stiffness = numbers[LawNumber.LIMIT] / numbers[LawNumber.LENGTH]
     if law == Law.MASING:
         # Slope of Segalman's first loading at 0
-        order = numbers[3] + 1
-        stiffness *= (numbers[4] + 1) / (numbers[4] + order / (order + 1))
+        order = numbers[LawNumber.CHI] + 1
+        beta = numbers[LawNumber.BETA]
+        stiffness *= (beta + 1) / (beta + order / (order + 1))
     return stiffness
 
 
 @njit(**NJIT_KERNEL)
 def find_share(at, branch, numbers):
-    """Return the irreversible part of the motion, d(slide - stretch)/d(slide).
+    """Return the irreversible fraction of the motion, d(slide - stretch)/d(slide).
 
     Parameters
     ----------
     at : Instant
+        Instant of the motion.
     branch : Branch
+        Branch of the law at this instant.
     numbers : (k,) array
         Numbers of the law.
     """
@@ -346,8 +342,10 @@ def find_share(at, branch, numbers):
         ratio = 1 - (branch.path - abs(at.slide - branch.start)) / branch.length
         if branch.path == inf or ratio >= 1:
             return 1.0
-        order = numbers[3] + 1
-        return max(ratio, 0.0) ** (order + 1) * order / (numbers[4] * (order + 1) + order)
+        order = numbers[LawNumber.CHI] + 1
+        return (
+            max(ratio, 0.0) ** (order + 1) * order / (numbers[LawNumber.BETA] * (order + 1) + order)
+        )
 
     # Stretch of the bristles relative to that in steady slip
     if law == Law.LUGRE:
@@ -358,8 +356,8 @@ def find_share(at, branch, numbers):
         return branch.direction * elastic / stiffness
 
     # Bonds: force relative to the limit; Bouc-Wen: its power
-    ratio = branch.direction * at.force / numbers[1]
+    ratio = branch.direction * at.force / numbers[LawNumber.LIMIT]
     if law == Law.BONDS:
         return ratio
-    share = abs(ratio) ** numbers[3]
-    return share if ratio > 0 else (1 - 2 * numbers[4]) * share
+    share = abs(ratio) ** numbers[LawNumber.EXPONENT]
+    return share if ratio > 0 else (1 - 2 * numbers[LawNumber.SHAPE]) * share

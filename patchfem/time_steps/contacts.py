@@ -1,5 +1,6 @@
 """Contact points of a rig or a bench: their laws, their ports, their loads, and the shear of their pieces."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,6 +13,7 @@ from .step_rows_kernels import Law
 
 if TYPE_CHECKING:
     from ..contact.contact_sets import ContactSets
+    from ..slip.shear_modes import JenkinsSet, ShearModes
 
 
 class BondSum(NamedTuple):
@@ -49,7 +51,7 @@ class PointSet:
     - row (n,): displacement of the port per modal coordinate
     - nodes (m,): node whose normal force is the load of a point; None for a share of the resultant. Nodes (2, m) of
       slides to +x and -x number the averages behind the nodes, in both directions, and then their sums
-    - shear: slip.shear_modes.ShearModes of pieces that deform, or None
+    - shear: shear modes of pieces that deform, or None
     - is_spring: whether the point is a spring
     - lower: pressure of the lower piece, if it gives the loads, or None
     - bond_sum: sum over the bonds of points with lists, or None
@@ -58,7 +60,7 @@ class PointSet:
     law: PointLaw
     row: np.ndarray
     nodes: np.ndarray | None = None
-    shear: object = None
+    shear: "ShearModes | None" = None
     is_spring: bool = False
     lower: LowerPressure | None = None
     bond_sum: BondSum | None = None
@@ -76,7 +78,7 @@ class Contact:
     - load: function of times (k,) [s] that returns a prescribed load [N]
     - preload: load at the start [N], with `sets`, `load` or `grooves`
     - grooves: grooves whose flanks the first interface climbs
-    - elements: slip.shear_modes.JenkinsSet whose elements are the points, or None
+    - elements: set whose elements are the points, or None
     - averages (2, m, m - 1, 2): weights of the nodal forces of `sets` in averages for slides to +x and -x, or None
     """
 
@@ -86,10 +88,10 @@ class Contact:
     sets: "ContactSets | None" = None
     heave: np.ndarray | None = None
     pitch: np.ndarray | None = None
-    load: object = None
+    load: Callable[[np.ndarray], np.ndarray] | None = None
     preload: float = 1.0
     grooves: Grooves | None = None
-    elements: object = None
+    elements: "JenkinsSet | None" = None
     averages: np.ndarray | None = None
 
     def is_rigid(self, point_set: PointSet) -> bool:

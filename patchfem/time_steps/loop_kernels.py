@@ -33,6 +33,7 @@ from .motion_kernels import (
     sum_products,
     write_trial,
 )
+from .step_rows_kernels import Value
 
 # Parts of a whole step, of which a stop or a release takes about 40, after which rigid friction stops and slips too often
 MAX_PARTS = 20_000
@@ -183,7 +184,7 @@ def write_sample(system, row, sample):
     sample[size + Sample.LOAD] = structure.loads[row] if structure.loads.size else 0.0
     steps.write_ports(system, sample)
     if system.flank.size:
-        path = steps.find_path(points)
+        path = points.values[0, Value.TOTAL]  # of the first point along its flank
         flanks.write_sample(system.flank, ports.values[Port.SLIDE, 0], path, sample, size)
     if ports.contact[0] >= 0:
         normal.write_sample(system, sample)
@@ -191,7 +192,7 @@ def write_sample(system, row, sample):
 
 @njit(**NJIT_CALL)
 def judge_sample(system, sample):
-    """Return the status of a march at a sample, named in `march_rows`."""
+    """Return the status of a march at a sample, as defined in `march_rows_kernels`."""
     output = sum_products(sample, system.structure.modes[2])
     if not abs(output) <= system.options.travel:
         return EXCEEDS_TRAVEL if output == output else NOT_FINITE
@@ -218,7 +219,7 @@ def march(system, n_steps, samples):
     int
         Number of steps done.
     int
-        Status, named in `march_rows`.
+        Status, as defined in `march_rows_kernels`.
     """
     size = system.state.shape[1]
     ticks = 1 << (system.structure.responses.shape[0] - 1)
@@ -267,17 +268,3 @@ def march(system, n_steps, samples):
                 level -= 1
         samples[i, size + Sample.WORK] = work
     return n_steps, DONE
-
-
-@njit(cache=True, **NJIT_KERNEL)
-def read_points(system, forces, stretch, loads):
-    """Write friction force [N], elastic stretch [m] and load [N] of the points of the first port, all (m,).
-
-    Parameters
-    ----------
-    system : march_rows_kernels.System
-        Arrays of the march.
-    forces, stretch, loads : (m,) array
-        Output.
-    """
-    steps.read_points(system, forces, stretch, loads)

@@ -80,7 +80,7 @@ LISTS_STALLED = 1e5
 LIST_CUTS = 30  # trials of a line search for lists
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
-# compliance of ports that share a force (`time_march.REDUNDANT`)
+# compliance of ports that share a force (`systems.REDUNDANT`)
 CREEP = 1e-7
 TINY = 1e-150  # m, in place of no path; its square is not zero
 
@@ -200,16 +200,17 @@ def weigh_block(points, block, damping, step):
         force = damping * values[Value.END + j] + rest * mean + rest * part * (half - mean)
         values[Value.FORCE + j] = force
 
-        # Slopes by the increment of the port and by the part of the pieces; `more` is that of `part`
-        more = rest * (half - mean) / (path * path)
+        # Derivatives by the increment of the port and by that of the pieces. The derivative of `part` is that of
+        # |bent| / (|slide| + |bent|), a sign times |slide| or |bent| over the square of the path.
+        by_part = rest * (half - mean) / (path * path)
         slide_sign = 1.0 if slide > 0 else -1.0
         bent_sign = 1.0 if bent > 0 else -1.0
         end_slope = values[Value.END_BY_SLIDE + j] + step.rate * values[Value.END_BY_VELOCITY + j]
         slope = values[Value.MEAN_BY_SLIDE + j] + step.rate * values[Value.MEAN_BY_VELOCITY + j]
         slope = rest * (1 - part) * slope + (damping + 0.5 * rest * part) * end_slope
-        values[Value.BY_SLIDE + j] = slope - more * abs(bent) * slide_sign
+        values[Value.BY_SLIDE + j] = slope - by_part * abs(bent) * slide_sign
         values[Value.BY_SHEAR + j] = (
-            more * (bent_sign * abs(slide) + slide_sign * abs(bent)) - slope
+            by_part * (bent_sign * abs(slide) + slide_sign * abs(bent)) - slope
         )
         values[Value.BY_VELOCITY + j] = 0.0
 
@@ -536,9 +537,9 @@ def write_products(points, p, matrix, n_ports, step):
 
 @njit(**NJIT_CALL)
 def write_balanced_forces(system, level, step):
-    """Compute increments and forces as `write_forces`, with the normal force on a flank that belongs to the friction.
+    """Compute increments and forces, and iterate the normal force on a flank with them.
 
-    Newton's method knows the forces under a given load only. On a steep flank the load follows the friction of all points.
+    On a steep flank the normal force depends on the friction of all points. Newton's Jacobian has no derivative of it.
 
     Parameters
     ----------
@@ -593,12 +594,12 @@ def solve_forces(system, level, step):
         system.totals[Total.ITERATIONS] += 1
         if not find_newton_step(system, level, step):
             return False
-        descent = -find_slope(system, level)
+        descent = -find_potential_slope(system, level)
         if has_potential and descent < 0:
             drop_negative_slopes(system)
             if not find_newton_step(system, level, step):
                 return False
-            descent = -find_slope(system, level)
+            descent = -find_potential_slope(system, level)
         store_base(system)
 
         # The line search accepts a step that decreases the largest residual, or one near the minimum of the potential of
@@ -614,7 +615,7 @@ def solve_forces(system, level, step):
             if residual <= 1.0:
                 break
             if has_potential:
-                slope = find_slope(system, level)
+                slope = find_potential_slope(system, level)
                 if descent <= 0 or slope <= MAX_OVERSHOOT * descent:
                     break
                 fraction *= max(0.1, descent / (slope + descent))  # at least a tenth per trial
@@ -648,10 +649,11 @@ def find_newton_step(system, level, step):
 
 
 @njit(**NJIT_CALL)
-def find_slope(system, level):
-    """Return the slope [J] along Newton's step of the potential whose minimum solves a step of lists.
+def find_potential_slope(system, level):
+    """Return the directional derivative [J] along Newton's step of the potential that a step of lists minimises.
 
-    Its derivatives are -C r by the port forces, with their residuals r, and the residuals of the shear coordinates.
+    The gradient is -C r for the port forces, with the compliance C and the residuals r of these forces, and the residual
+    for a shear coordinate.
     """
     ports = system.ports
     compliance = ports.compliance[level]
@@ -860,6 +862,18 @@ def release_port(system, drive, is_last):
 
 
 @njit(**NJIT_CALL)
+def store_end(points, block):
+    """Store memory, loads and forces of a block of points at the end of a step as those at the start of the next one."""
+    values = points.values[block]
+    for j in range(count_lanes(points, block)):
+        values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
+        values[Value.START_BACK + j] = values[Value.END_BACK + j]
+        values[Value.START + j] = values[Value.END + j]
+    for k in range(points.n_memory[block]):
+        points.memory[block, k] = points.trial[block, k]
+
+
+@njit(**NJIT_CALL)
 def commit(system, duration):
     """Advance memories, shear coordinates and loads after an accepted step of a `duration` [s].
 
@@ -886,15 +900,9 @@ def commit(system, duration):
         n_lanes = count_lanes(points, block)
         for j in range(n_lanes):
             values[Value.TOTAL + j] += values[Value.SLIDE + j]
-            values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
-            values[Value.START_BACK + j] = values[Value.END_BACK + j]
             values[Value.START_VELOCITY + j] = values[Value.VELOCITY + j]
-            values[Value.START + j] = values[Value.END + j]
             values[Value.LAST_SLIDE + j] = values[Value.SLIDE + j]
-        memory = points.memory[block]
-        trial = points.trial[block]
-        for k in range(points.n_memory[block]):
-            memory[k] = trial[k]
+        store_end(points, block)
 
     system.totals[Total.REST] = rest
     advance_shear(points, duration)
@@ -917,10 +925,14 @@ def find_damping(system, level):
 
 @njit(**NJIT_CALL)
 def find_order(system):
-    """Return the weight of the formula of order 2 for the velocity of points behind pieces, the rest is of order 1.
+    """Return the weight, from 0 to 1, of the formula of order 2 in the velocity of points behind pieces.
+
+    The remainder is the weight of the formula of order 1.
 
     Where the law "tanh" is much faster than a step, the force hardly depends on the velocity, and only the formula of order
-    1 keeps points at rest that stick. Where the pieces relax within a step, the formula of order 2 overshoots.
+    1 keeps points at rest that stick. Where the pieces relax within a few steps, the formula of order 2 overshoots. The
+    change of their rates between two steps, relative to the sum of the rates, falls with the step of a smooth motion, so
+    that the order of the result is 2.
     """
     points = system.points
     moves = system.ports.values
@@ -928,15 +940,22 @@ def find_order(system):
     weight = 1.0
     for p in range(moves.shape[1]):
         block = points.first[p]
-        if block == points.first[p + 1] or points.law[block] != Law.TANH:
+        is_tanh = block < points.first[p + 1] and points.law[block] == Law.TANH
+        if not is_tanh or points.first_shear[p] == points.first_shear[p + 1]:
             continue
+        change = 0.5 * (moves[Port.FREE_VELOCITY, p] - moves[Port.VELOCITY, p])
+        change /= points.numbers[block, WIDTH]
+        weight = min(weight, 1 / (1 + change * change))
+
+        jump = 0.0
+        size = 0.0
         for k in range(points.first_shear[p], points.first_shear[p + 1]):
-            # With the factor 10 a start at full speed overshoots by 2e-4 at 200 steps per cycle, with 0 by 2e-2.
-            jump = 10 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k])
-            jump /= shear[Shear.SCALE, k]
-            change = 0.5 * (moves[Port.FREE_VELOCITY, p] - moves[Port.VELOCITY, p])
-            change = (abs(change) + abs(jump)) / points.numbers[block, WIDTH]
-            weight = min(weight, 1 / (1 + change * change))
+            last = shear[Shear.LAST, k] / shear[Shear.SCALE, k]
+            earlier = shear[Shear.EARLIER, k] / shear[Shear.SCALE, k]
+            jump += abs(last - earlier)
+            size += abs(last) + abs(earlier)
+        if size > 0:
+            weight = min(weight, 1 - jump / size)
     return weight
 
 
@@ -1041,47 +1060,8 @@ def press_at_rest(system):
             load = pick_load(values, Value.END_LOAD, points.memory[block, 0])
             values[Value.END] = points.numbers[block, WIDTH] * load * points.memory[block, 0]
         elif points.law[block] != Law.LIST:
-            slide_points(
-                points.law[block],
-                points.numbers[block],
-                points.memory[block],
-                points.trial[block],
-                values,
-                points.count[block],
-                step,
-            )
-            for k in range(points.n_memory[block]):
-                points.memory[block, k] = points.trial[block, k]
-
-        for j in range(points.count[block]):
-            values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
-            values[Value.START_BACK + j] = values[Value.END_BACK + j]
-            values[Value.START + j] = values[Value.END + j]
-
-
-@njit(**NJIT_CALL)
-def find_path(points):
-    """Return the displacement [m] of the first point since the start, along its flank."""
-    return points.values[0, Value.TOTAL]
-
-
-@njit(**NJIT_CALL)
-def read_points(system, forces, stretch, loads):
-    """Write friction force [N], elastic stretch [m] and load [N] of the points of the first port, all (m,).
-
-    Parameters
-    ----------
-    system : march_rows_kernels.System
-        Arrays of the march.
-    forces, stretch, loads : (m,) array
-        Output.
-    """
-    for i in range(forces.size):
-        values = system.points.values[i // WIDTH]
-        j = i % WIDTH
-        forces[i] = values[Value.START + j]
-        stretch[i] = values[Value.STRETCH + j]
-        loads[i] = values[Value.END_LOAD + j]
+            slide_block(system, block, step)
+        store_end(points, block)
 
 
 @njit(**NJIT_CALL)

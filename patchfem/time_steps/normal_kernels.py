@@ -15,7 +15,11 @@ from .motion_kernels import find_modal_energy, solve_holds, sum_products
 
 @njit(**NJIT_CALL)
 def average_forces(points):
-    """Write the averages of the forces of the nodes behind each node, as far as they carry load without a gap."""
+    """Write the weighted averages of the nodal forces behind each node to `points.averaged`, and their sums.
+
+    The averages for slides to +x come first, then those for slides to -x. A node without load has the average 0. The sum
+    behind a node ends at the first segment whose two nodes carry no load.
+    """
     forces = points.nodal
     n = forces.size
     for k in range(2):
@@ -50,7 +54,7 @@ def find_resultant(system, forces):
     if system.points.averages.size:
         average_forces(system.points)
     energy = compute_energy(system.sets, slot, up, turn)
-    return max(system.sets.reference[REFERENCE_LOAD_INDEX] - energy[1], 0.0)
+    return max(system.sets.reference[REFERENCE_LOAD_INDEX] - energy.heave_slope, 0.0)
 
 
 @njit(**NJIT_CALL)
@@ -108,8 +112,8 @@ def find_holds(system, state, drive):
     up = sum_products(ports.rows[heave], state[:n])
     turn = sum_products(ports.rows[pitch], state[:n])
     energy = compute_energy(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn)
-    ports.vector[heave] += energy[1]
-    ports.vector[pitch] += energy[2]
+    ports.vector[heave] += energy.heave_slope
+    ports.vector[pitch] += energy.rotation_slope
     solve_holds(system, state, drive)
 
 
@@ -124,7 +128,7 @@ def find_motion_energy(system):
     slot = find_set(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], -up, turn)
     system.sets.counters[PRESENT_SLOT_INDEX] = slot
     energy = find_modal_energy(system)
-    return energy + compute_energy(system.sets, slot, up, turn)[0] if slot >= 0 else energy
+    return energy + compute_energy(system.sets, slot, up, turn).value if slot >= 0 else energy
 
 
 @njit(**NJIT_CALL)
@@ -136,8 +140,8 @@ def write_sample(system, sample):
     turn = ports.values[Port.SLIDE, int(ports.contact[1])]
     energy = compute_energy(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn)
     reference = system.sets.reference
-    sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD_INDEX] - energy[1], 0.0)
-    sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT_INDEX] - energy[2]
-    sample[size + Sample.CONTACT_ENERGY] = energy[0]
+    sample[size + Sample.LOAD] = max(reference[REFERENCE_LOAD_INDEX] - energy.heave_slope, 0.0)
+    sample[size + Sample.MOMENT] = reference[REFERENCE_MOMENT_INDEX] - energy.rotation_slope
+    sample[size + Sample.CONTACT_ENERGY] = energy.value
     sample[size + Sample.HEAVE] = up
     sample[size + Sample.PITCH] = turn

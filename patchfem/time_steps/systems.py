@@ -82,7 +82,8 @@ def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
     matrix[2 * n, 2 * n + 1] = matrix[2 * n + 1, 2 * n + 2] = 1.0
     matrix[velocities, 2 * n + 3 :] = np.eye(n)
 
-    # The first step resolves the fastest mode. As steps double, an integral of x(t)^T form x(t) is the sum of both halves.
+    # Loss and work are integrals of quadratic forms x^T A x of the state. Gauss quadrature integrates them over a step that
+    # resolves the fastest mode. The integral over twice the step is A + E^T A E, with the matrix exponential E of the step.
     fastest = float(modes.omega.max(initial=0.0)) * step
     n_halvings = max(levels - 1, int(np.ceil(np.log2(max(fastest / MAX_ANGLE, 1e-300)))))
     short = step / 2**n_halvings
@@ -265,8 +266,8 @@ def find_stiffness(point_set) -> float:
     law = point_set.law
     if point_set.shear is None:
         return float(law.stiffness.sum())
-    # The energy of a unit slide, 1/2 (1 - S y)^T D (1 - S y) + 1/2 y^T K y, is least at coordinates y of the shear, for
-    # stiffnesses D of the points, K of the coordinates, and shapes S. There it has no error of first order in y.
+    # The coordinates y of the shear minimise the energy 1/2 (1 - S y)^T D (1 - S y) + 1/2 y^T K y of a unit slide, with the
+    # stiffnesses D of the points and K of the coordinates, and the shapes S. An error of y changes it in second order only.
     is_stiff = law.stiffness > 0
     shape = np.asarray(point_set.shear.shape)[is_stiff]
     own = law.stiffness[is_stiff]
@@ -371,9 +372,10 @@ def _make_points(contact, n_ports: int) -> Points:
 
 
 def _join_pressures(sets) -> tuple[list[list[float]], np.ndarray]:
-    """Return by how much the places of each set of points are shifted [m], for each of its tables, and one table (2, k).
+    """Join the pressure tables of all lower pieces to one.
 
-    The tables of the pressures on lower pieces stand so far apart that no slide leads from one to the next.
+    They stand so far apart that no slide leads from one to the next. The results are, for each set of points, the shifts [m]
+    of the places of its tables, and the joined table (2, k) of places [m] and relative pressures.
     """
     shifts = []
     parts = []

@@ -32,6 +32,7 @@ from .march_rows_kernels import (
     System,
     Total,
 )
+from .step_rows_kernels import WIDTH, Value
 from .systems import copy_system, make_system
 
 MAX_CYCLES_AT_ONCE = 8
@@ -326,7 +327,7 @@ class March:
         time = (self.done + self.shift) * self.step
         motion = (time, float(row @ sample[:n]), *remainder[Sample.PORTS : Sample.PORTS + 2])
         motion = (*motion, remainder[Sample.HEAVE], remainder[Sample.PITCH])
-        return make_snapshot(self.kernels, self.system, self.contact.point_sets[0], motion)
+        return make_snapshot(self.system, self.contact.point_sets[0], motion)
 
     def find_ledger(self, sample, energies) -> dict[str, float]:
         """Return energies [J] and counters by name at a sample of the present state, with the sums `Energy` up to it."""
@@ -387,13 +388,11 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     return np.where((losses < 0) & (losses > -noise), 0.0, losses)
 
 
-def make_snapshot(kernels, system: System, point_set, motion: tuple[float, ...]) -> Snapshot:
+def make_snapshot(system: System, point_set, motion: tuple[float, ...]) -> Snapshot:
     """Return the state of the points on the first port.
 
     Parameters
     ----------
-    kernels : module
-        Compiled march.
     system : march_rows_kernels.System
         Arrays of the march.
     point_set : contacts.PointSet
@@ -402,10 +401,10 @@ def make_snapshot(kernels, system: System, point_set, motion: tuple[float, ...])
         The first six fields of Snapshot.
     """
     count = np.size(point_set.law.numbers[0])
-    forces = np.zeros(count)
-    stretch = np.zeros(count)
-    loads = np.zeros(count)
-    kernels.read_points(system, forces, stretch, loads)
+    forces, stretch, loads = (
+        system.points.values[:, row : row + WIDTH].flatten()[:count]
+        for row in (Value.START, Value.STRETCH, Value.END_LOAD)
+    )
 
     # The pieces at rest under the present forces; the march brings only their means over a step into equilibrium.
     bend = np.zeros(count)

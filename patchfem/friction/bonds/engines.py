@@ -40,7 +40,10 @@ class EngineChoice:
     strips: float
 
     def find_error(self, join_error: float) -> float:
-        """Return the bound of the total error / friction limit after joins of at most `join_error` / load in full lists."""
+        """Return the bound of the total error / friction limit.
+
+        `join_error` is the largest error / load of a join that made room in a full list, or 0.
+        """
         return max(self.error, self.tail + FORCE_TO_JOIN_ERROR_GROWING * join_error)
 
     def reach(self, order: float) -> float:

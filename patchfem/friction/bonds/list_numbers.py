@@ -6,6 +6,7 @@ import numpy as np
 
 from .parameters import Bonds, growth_numbers
 from .strip_rows_kernels import (
+    EXACT_JOIN,
     MAX_NEW_STRIPS,
     N_CELLS_PER_AGE,
     N_COEFFICIENTS,
@@ -22,7 +23,6 @@ INITIAL_HALF_WIDTH = 1e-6
 JOIN_AGE = 3.0
 JOIN_AGE_PER_ORDER = 2.0
 JOIN_ERROR = 0.1  # error of a join of young strips relative to the load, per square of the merge width [bond lengths]
-EXACT_JOIN = 1e-13  # error of joins, relative to the load, that is round-off
 MAX_STRIPS = 1024  # strips of a list beyond which joins with larger errors make room
 N_UNMERGED_STRIPS = 20_000  # all strips of lists that join without an error only
 # Age from which bonds have no strength to round-off, for the order 0, and what each order adds

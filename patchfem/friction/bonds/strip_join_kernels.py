@@ -7,11 +7,10 @@ from ...compiled.flags_kernels import NJIT_KERNEL
 from ...compiled.jit import njit
 from .decay_kernels import find_decay
 from .list_math_kernels import fast_exp
-from .strip_rows_kernels import N_STRIP_ENTRIES, ListLaw, ListState, Strip
+from .strip_rows_kernels import EXACT_JOIN, N_STRIP_ENTRIES, ListLaw, ListState, Strip
 from .strip_sum_kernels import GAUSS, Moved, find_ages, mix
 
 CONTIGUOUS_TOL = 1e-9  # round-off of the ends of two strips that formed one after the other, relative to their length
-EXACT_JOIN = 1e-13  # error of a join that is round-off
 MAX_YOUNG_RANGE = 0.25  # largest range of ages of growing bonds relative to the youngest one, for an order below 0
 MIN_LOAD = 1e-300  # smallest load [N] by which a weight is divided
 MIN_MISFIT_AGE = 1e-12  # smallest age [bond lengths] at which the strength of bonds of a fractional order is compared
@@ -42,6 +41,7 @@ def write_strip(strips, k, strip):
     k : int
         Number of the strip.
     strip : Strip
+        Strip to be written.
     """
     for i in range(N_STRIP_ENTRIES):
         strips[k, i] = strip[i]

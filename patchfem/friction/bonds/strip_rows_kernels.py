@@ -10,6 +10,7 @@ import numpy as np
 N_CELLS_PER_AGE = 4
 N_COEFFICIENTS = 9
 MAX_NEW_STRIPS = 8  # strips that a step adds to a list at most
+EXACT_JOIN = 1e-13  # error of a join, relative to the load, that is round-off
 
 
 class Strip(NamedTuple):

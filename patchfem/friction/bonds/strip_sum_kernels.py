@@ -94,15 +94,7 @@ class Passage(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def mix(first, last, fraction):
-    """Return the value at a fraction of the way from one value to another.
-
-    Parameters
-    ----------
-    first, last : float
-        Values at the fractions 0 and 1.
-    fraction : float
-        Fraction of the way.
-    """
+    """Interpolate linearly between the values `first` at the fraction 0 and `last` at the fraction 1."""
     return first + fraction * (last - first)
 
 
