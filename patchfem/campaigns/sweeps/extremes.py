@@ -1,7 +1,8 @@
 """Smallest or largest value of a measure inside the range of a swept key, and where it lies.
 
 It is the vertex of the parabola through the extreme case and its neighbours, over the logarithm of a key whose values are
-spaced by factors.
+spaced by factors. A vertex that differs from the extreme case by more than EXTREME_BAND is not resolved by the cases: the
+extreme is then that case, and lies somewhere between its neighbours.
 """
 
 from itertools import product
@@ -30,9 +31,9 @@ class Extreme(NamedTuple):
         Value of the key.
     interval : tuple of float
         Smallest and largest value of the key between which the extreme lies.
-    band : tuple of float
+    band : tuple of float, optional
         Values of the key between which the measure differs from its extreme by at most EXTREME_BAND; an end of the sweep
-        where it does not leave this band.
+        where it does not leave this band. None if the cases do not resolve the extreme.
     """
 
     measure: str
@@ -42,7 +43,7 @@ class Extreme(NamedTuple):
     value: float
     place: float
     interval: tuple[float, float]
-    band: tuple[float, float]
+    band: tuple[float, float] | None
 
 
 def find_extreme(table: SweepTable, name: str) -> Extreme | None:
@@ -87,6 +88,11 @@ def find_extreme(table: SweepTable, name: str) -> Extreme | None:
     place, value = _find_vertex(x[top - 1 : top + 2], y[top - 1 : top + 2])
     ends = _find_interval(x, y, error, top)
     band = _find_band(x, y, top, value)
+    if abs(value - y[top]) > EXTREME_BAND * abs(y[top]):
+        place = x[top]
+        value = float(y[top])
+        ends = (x[top - 1], x[top + 1])
+        band = None
     to_key = np.exp if key.is_logarithmic else float
     return Extreme(
         measure=name,
@@ -96,7 +102,7 @@ def find_extreme(table: SweepTable, name: str) -> Extreme | None:
         value=value,
         place=float(to_key(place)),
         interval=(float(to_key(ends[0])), float(to_key(ends[1]))),
-        band=(float(to_key(band[0])), float(to_key(band[1]))),
+        band=None if band is None else (float(to_key(band[0])), float(to_key(band[1]))),
     )
 
 
