@@ -82,7 +82,6 @@ PUBLIC = {
     "rig.engines": (
         "ENGINES",
         "choose_numerics",
-        "estimate_hybrid_errors",
         "find_obstacle_of_map",
     ),
     "rig.plan": (
