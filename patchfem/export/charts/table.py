@@ -494,8 +494,8 @@ COST_CHARTS = (
         by="result",
         x_label="CPU time",
         y_label="largest relative error",
-        caption="Largest relative error of any measure in each run, and the tolerance of this run at the same CPU time. A "
-        "run meets its tolerance if its error is below it.",
+        caption="Largest relative error of any main measure in each run, and the tolerance of this run at the same CPU "
+        "time. A run meets its tolerance if its error is below it.",
     ),
     Chart(
         "Value against time",
@@ -506,7 +506,19 @@ COST_CHARTS = (
         by="result",
         x_label="CPU time",
         y_label="*",
-        caption="The least accurate of the key measures in each run, with its numerical error.",
+        caption="The least accurate of the main measures in each run, with its numerical error.",
+    ),
+    Chart(
+        "Convergence",
+        "point_seconds",
+        "point_change",
+        "points",
+        log="xy",
+        by="point_measure",
+        x_label="CPU time",
+        y_label="relative change from the finest run",
+        caption="Difference of each main measure from its value in the finest run, over the CPU time. The table has the "
+        "order that the finest three runs show.",
     ),
 )
 COMPARE_CHARTS = (
@@ -799,6 +811,12 @@ TABLES: dict[str, tuple[Table, ...]] = {
             "run",
             "varied = knob:name, setting, interface nodes = nodes, steps per cycle = steps, CPU s = seconds:rounded, "
             "largest error = largest_error:rounded, of = worst_measure, * = main_measure, result",
+        ),
+        Table(
+            "Convergence over one setting",
+            "convergence",
+            "varied = setting:name, measure:name, finest value = text, observed order = order:rounded, "
+            "within 1 % from = for_1_percent, within 0.1 % from = for_1_permille",
         ),
     ),
 }
