@@ -28,15 +28,9 @@ from .answer import (
     make_columns,
     to_plain,
 )
+from .rows import make_variables
 from .runs import make_origin
 
-# columns of cost.csv that every run has: attribute -> heading and unit
-COST_FILE_COLUMNS = {
-    "label": ("setting", ""),
-    "seconds": ("seconds", "s"),
-    "wall_seconds": ("wall_seconds", "s"),
-    "timings": ("timings", ""),
-}
 # Words for the judgement of the scene as it is.
 SCENE_JUDGEMENT_WORDS = {
     Judgement.MEETS: "meets the tolerance",
@@ -214,9 +208,11 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     `rows` are runs with their judgements, and `main` is the name of the main measure.
     """
     runs = [row.run for row in rows]
-    columns = {"knob": ([row.knob for row in rows], "")}
-    for attribute, (name, unit) in COST_FILE_COLUMNS.items():
-        columns[name] = ([getattr(run, attribute) for run in runs], unit)
+    columns = {"knob": [row.knob for row in rows], "setting": [run.label for run in runs]}
+    for name in ("seconds", "wall_seconds", "timings"):
+        columns[name] = [getattr(run, name) for run in runs]
+    data = make_variables("cost", **columns)
+    columns = {}
     units = {name: one.unit for run in runs for name, one in run.measures.items()}
     for name, unit in units.items():
         for heading, part in ((name, "value"), (f"error_{name}", "error")):
@@ -224,14 +220,17 @@ def _make_data(rows: list[Row], main: str) -> Variables:
             columns[heading] = (numbers, unit)
 
     # an exact run has no place on a logarithmic axis
-    columns["largest_error"] = ([row.worst.fraction or None for row in rows], "1")
-    columns["tolerance"] = ([run.tolerance for run in runs], "1")
-    columns["worst_measure"] = ([row.worst.name.replace("_", " ") for row in rows], "")
+    data |= make_columns("run", columns)
+    columns = {
+        "largest_error": [row.worst.fraction or None for row in rows],
+        "tolerance": [run.tolerance for run in runs],
+        "worst_measure": [row.worst.name.replace("_", " ") for row in rows],
+    }
     for name in ("nodes", "steps"):
         counts = [getattr(run, name) for run in runs]
         if any(counts):
-            columns[name] = (counts, "1")
-    data = make_columns("run", columns)
+            columns[name] = counts
+    data |= make_variables("cost", **columns)
     data |= {"main_measure": data[main], "main_measure_error": data[f"error_{main}"]}
 
     # a colour for each varied setting and for runs that miss the tolerance
