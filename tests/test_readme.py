@@ -130,11 +130,8 @@ def run_recipe(tmp_path, monkeypatch):
     The folder contains only the files that the commands name.
     """
     monkeypatch.chdir(tmp_path)
-    lines = re.search(r"## Five doors\n.*?```bash\n(.*?)```", read_page("README.md"), re.S)[1]
-    commands = {
-        question.strip().partition(":")[0]: command
-        for command, _, question in (line.partition("#") for line in lines.splitlines())
-    }
+    doors = read_page("README.md").partition("## Five doors")[2].partition("## A scene")[0]
+    commands = dict(re.findall(r"^\| \[(.*?)\].* \| `(.*)` \|$", doors, re.M))
     assert len(commands) == 5
     for name in re.findall(r"studies/\S+", " ".join(commands.values())):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
