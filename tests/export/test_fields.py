@@ -15,8 +15,7 @@ from vtk_frames import read_with_vtk
 from vtkmodules.vtkCommonCore import vtkDataArray
 
 import patchfem as pf
-from patchfem.export.fields.blocks import VTK_FIELDS
-from patchfem.export.fields.vtkhdf import VTKHDF_FILE, read_frames
+from patchfem.export.fields.vtkhdf import VTK_FIELDS, VTKHDF_FILE, read_frames
 
 PARTS = ["lower", "upper", "interface"]
 MAX_ROUNDING = 1e-6  # relative error of a number in the file

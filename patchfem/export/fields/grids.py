@@ -10,8 +10,7 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import explain_mkdir_error, write_rows, write_text
-from .blocks import VTK_FIELDS
-from .vtkhdf import Frames, collect_frames, write_blocks
+from .vtkhdf import VTK_FIELDS, Frames, collect_frames, write_blocks
 
 if TYPE_CHECKING:
     from pyvista import MultiBlock

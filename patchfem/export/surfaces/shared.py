@@ -1,22 +1,39 @@
-"""Sentences of a comparison: one table of codes each for verdicts, findings and reasons.
+"""Parts of the answers on surfaces: sentences of a comparison, quantities, bands, maps, and the record itself.
 
-A sentence is a template whose fields are the numbers of the record as text; no sentence is read back.
+There is a table of codes each for verdicts, findings and reasons. A sentence is a template whose fields are the numbers of
+the record as text; no sentence is read back.
 """
 
 from collections import defaultdict
+from pathlib import Path
 from typing import NamedTuple
 
-from ...surface.compare.records import Comparison, Track
-from ...surface.quantity import Quantity
-from .. import answer, quantities
+import numpy as np
 
+from ... import __version__
+from ...surface.compare.records import Comparison, Track
+from ...surface.quantity import CONFIDENCE_LEVEL, Quantity
+from .. import answer, quantities
+from ..answer import JsonObject, Remarks, Variables
+from ..rows import make_variables
+from ..surface_definitions import name_in_track
+
+MAX_MAP_POINTS = 400  # largest number of rows and of columns of a stored map
+SURFACE_NAMES = ("before", "after")  # keys of the two compared surfaces or runs
+# Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
+SHOWN_ELSEWHERE = (
+    "worn_depth_within",
+    "worn_from_before",
+    "worn_from_after",
+    "worn_to_before",
+    "worn_to_after",
+)
 RATIO_ROUND_OFF = 1e-6  # largest difference of a ratio from 1 that is round-off
 MAX_VERDICT_SENTENCES = 4  # largest number of sentences of a verdict
 INTERVALS_SENTENCE = (
     "Numbers in brackets are 95 % intervals for the measured place; another place on the surface may differ by "
     "more."
 )
-
 # Headline for each code of the verdict. {mean}: worn depth with its interval; {region}: what it is the mean of.
 VERDICT_HEADLINES = {
     "worn": "Worn depth {mean}, the mean of the lost material over {region}.",
@@ -36,7 +53,6 @@ VERDICT_HEADLINES = {
     "mirror_finish": "Not comparable: the short waves of the surface (rms height {rq}) hardly exceed the noise ({noise}).",
     "identical": "No wear: both files hold the same heights; was the same file given twice?",
 }
-
 # Second sentence where there is no worn depth: what would be seen, or what to do.
 NO_DEPTH_ADVICE = {
     "no_wear": "A track over the middle third with unworn flanks is found from a mean depth of {detection_limit} on.",
@@ -49,7 +65,6 @@ NO_DEPTH_ADVICE = {
     "scar_or_step": "Traces with unworn surface on both sides of the scar, or a second measurement, would decide.",
     "scar_or_bow": "Longer traces with unworn surface on both sides, or a datum that is known to be straight, would decide.",
 }
-
 # Headline and advice of scans where they differ; flanks are those of a track in a trace.
 SCAN_VERDICTS = {
     "elsewhere": (
@@ -62,7 +77,6 @@ SCAN_VERDICTS = {
         "{detection_limit}.",
     ),
 }
-
 # Sentences on findings: further sentences of the verdict, warnings, and notes.
 VERDICT_FINDINGS = {
     "no_old_surface_left": "From {from} to {to} nothing of the first surface is left; the depth is measured below "
@@ -89,7 +103,6 @@ FINDING_NOTES = {
     "other_length": "Lengths in the second trace are {scale} ({low} to {high}) times those in the first.",
 }
 MISSING_NUMBER_TEXT = "any amount"  # stands for a missing number
-
 # Why a quantity has no value.
 MISSING_VALUE_REASONS = {
     "elsewhere": "no common part of both surfaces is found",
@@ -116,11 +129,31 @@ MISSING_VALUE_REASONS = {
     "sections": "no interval from fewer than five sections",
     "few_files": "no interval from so few files",
 }
-
 # SI units of the numbers of findings other than lengths; of areas between traces, and of volumes between scans
 RATIO_NUMBERS = ("unworn", "scale", "low", "high", "gain", "significance", "sure")
 FINDING_NUMBER_UNITS = dict.fromkeys(RATIO_NUMBERS, "1")
 AREA_OR_VOLUME_NUMBERS = ("grown", "lost", "area")
+
+
+def make_band(name: str, values: np.ndarray, half_width: np.ndarray) -> Variables:
+    """Return lengths with the ends of their band as the variables NAME, NAME_low and NAME_high.
+
+    Parameters
+    ----------
+    name : str
+        Name of the variable.
+    values, half_width : (n,) array
+        Lengths, and half-widths of their band [m].
+    """
+    ends = {f"{name}_low": values - half_width, f"{name}_high": values + half_width}
+    return make_variables("surface", **{name: values}, **ends)
+
+
+def make_maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> Variables:
+    """Return maps (m, n) [m] at x (n,), y (m,) [m] as variables, with every k-th row and column if they are large."""
+    rows, columns = (slice(None, None, -(-axis.size // MAX_MAP_POINTS)) for axis in (y, x))
+    maps = {name: one[rows, columns].astype(np.float32) for name, one in heights.items()}
+    return make_variables("surface", x=x[columns], y=y[rows], **maps)
 
 
 class Words(NamedTuple):
@@ -258,3 +291,54 @@ def _format_numbers(numbers: dict[str, float | str | None], is_areal: bool) -> d
     # without a limit there is nothing to state
     fields["limit"] = f", by up to {fields['limit']} on average," if "limit" in fields else ""
     return fields
+
+
+def build_answer(
+    *,
+    sources: list[str],
+    words: Words,
+    values: dict[str, Quantity],
+    track: dict[str, Quantity],
+    data: Variables,
+    details: JsonObject,
+) -> answer.Answer:
+    """Return the answer of a comparison of two surfaces or runs.
+
+    Parameters
+    ----------
+    sources : list of str
+        Files or folders before and after wear.
+    words : Words
+        Verdict, warnings and notes.
+    values, track : dict of str to Quantity
+        Quantities of the whole surface, and of the longest track ({} without one).
+    data : dict of str to Variable
+        Variables of the charts by name.
+    details : dict
+        Further content of compare.json.
+    """
+    # Values are shown once on the page; compare.json has them all.
+    values = values | {name_in_track(name): value for name, value in track.items()}
+    shown = {name: one for name, one in values.items() if name not in SHOWN_ELSEWHERE}
+
+    # Head of compare.json: the verdict and all quantities. `details` follow.
+    content = {
+        "patchfem": __version__,
+        "verdict": words.verdict[0],
+        "sentences": [*words.verdict[1:], *words.warnings, *words.notes],
+        "confidence": CONFIDENCE_LEVEL,
+        **dict(zip(SURFACE_NAMES, sources, strict=True)),
+        **to_answers(values),
+        "track": to_answers(track) or None,
+    }
+
+    return answer.Answer(
+        kind="compare",
+        title=" and ".join(Path(source).name for source in sources),
+        verdict=words.verdict,
+        quantities=to_answers(shown),
+        data=data,
+        remarks=Remarks(words.warnings, words.notes),
+        details=content | details,
+        origin={"patchfem": __version__},
+    )
