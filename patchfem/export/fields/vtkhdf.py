@@ -19,6 +19,7 @@ from ...runs.pieces import (
     compute_pieces,
     number_distinct_frames,
 )
+from ..rows import VARIABLES
 
 # parts of a run in the order in which they are stored
 STORED_PARTS = ("lower", "upper", "interface")
@@ -32,42 +33,11 @@ REQUIRED_FIELDS = {
     "upper": {"displacement", "von_mises"},
     "interface": {"displacement", "gap", "holder_slide", "normal_stress"},
 }
+# Rows of all fields by name, and the shape of a value of the fields with components
+VTK_FIELDS = VARIABLES["field"]
+FIELD_SHAPES = {"displacement": (3,), "stress": (6,)}
 # Fields of the cells of a face, which is the only part of its file
 REQUIRED_FACE_FIELDS = {"gap", "normal_stress", "weight"}
-
-
-class Field(NamedTuple):
-    """How a field is stored.
-
-    - unit: SI unit.
-    - shape: shape of one value.
-    - codes: meanings of its codes 0, 1, ...; empty for a field of numbers.
-    """
-
-    unit: str
-    shape: tuple[int, ...] = ()
-    codes: tuple[str, ...] = ()
-
-
-VTK_FIELDS = {
-    "displacement": Field("m", (3,)),
-    "stress": Field("Pa", (6,)),  # xx, yy, zz, xy, yz, xz; tension is positive
-    "von_mises": Field("Pa"),
-    "stress_error": Field("1"),
-    "material": Field("1", codes=("substrate", "coating")),
-    "weight": Field("m2"),
-    "normal_stress": Field("Pa"),
-    "shear_stress": Field("Pa"),
-    "gap": Field("m"),
-    "slip": Field("m"),
-    "holder_slide": Field("m"),
-    "status": Field("1", codes=("open", "stick", "slip")),
-    "worn_depth": Field("m"),
-    "normal_bond_lower": Field("Pa"),
-    "normal_bond_upper": Field("Pa"),
-    "shear_bond_lower": Field("Pa"),
-    "shear_bond_upper": Field("Pa"),
-}
 
 
 class Block(NamedTuple):
@@ -162,10 +132,10 @@ def _convert_fields(data: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     out = {}
     for name, values in data.items():
         field = VTK_FIELDS[name]
-        if field.shape:
-            values = _pad_components(values, *field.shape)
+        if field.dims:
+            values = _pad_components(values, *FIELD_SHAPES[name])
         if name not in ("normal_stress", "weight"):
-            values = values.astype(np.int8 if field.codes else np.float32)
+            values = values.astype(np.int8 if field.meanings else np.float32)
         out[name] = values
     return out
 
@@ -321,9 +291,9 @@ def _write_field(group, name: str, values: np.ndarray) -> None:
     chunks = (values.shape[1], *(1 for _ in values.shape[2:]))
     dataset = _write_array(group, name, flat, chunks)
     dataset.attrs["units"] = field.unit
-    if field.codes:
-        dataset.attrs["flag_values"] = np.arange(len(field.codes), dtype=np.int8)
-        dataset.attrs["flag_meanings"] = " ".join(field.codes)
+    if field.meanings:
+        dataset.attrs["flag_values"] = np.arange(len(field.meanings), dtype=np.int8)
+        dataset.attrs["flag_meanings"] = " ".join(field.meanings)
 
 
 def find_fields(folder: Path) -> Path:
@@ -400,4 +370,4 @@ def _read_field(rows, offsets: np.ndarray, size: int, count: int) -> np.ndarray:
     name = rows.name.rpartition("/")[2]
     if len(offsets) != count:
         raise ValueError(f"{name} has {len(offsets)} frames")
-    return rows[:].reshape(-1, size, *VTK_FIELDS[name].shape)[offsets // size]
+    return rows[:].reshape(-1, size, *FIELD_SHAPES.get(name, ()))[offsets // size]

@@ -1,9 +1,9 @@
 """Parts of the answers on surfaces: sentences of a comparison, quantities, bands, maps, and the record itself.
 
-There is a table of codes each for verdicts, findings and reasons. A sentence is a template whose fields are the numbers of
-the record as text; no sentence is read back.
+sentences.toml has the sentences of verdicts, findings and reasons by their codes; no sentence is read back.
 """
 
+import tomllib
 from collections import defaultdict
 from pathlib import Path
 from typing import NamedTuple
@@ -34,101 +34,9 @@ INTERVALS_SENTENCE = (
     "Numbers in brackets are 95 % intervals for the measured place; another place on the surface may differ by "
     "more."
 )
-# Headline for each code of the verdict. {mean}: worn depth with its interval; {region}: what it is the mean of.
-VERDICT_HEADLINES = {
-    "worn": "Worn depth {mean}, the mean of the lost material over {region}.",
-    "no_wear": "No wear is shown: the mean worn depth over {region} is at most {at_most}.",
-    "grown": "Material grew: {grown} stand above the first surface, {lost} are lost; deposits, or files in the wrong order.",
-    "worn_and_grown": "Worn depth {mean}, the mean of the lost material over {region}, and material grew: {lost} lost, "
-    "{grown} grown.",
-    "growth_at_ends": "Either a scar of {scar_depth} over the rest of the surface, or {growth_height} of material that "
-    "grew at the ends: both are possible.",
-    "scar_or_bow": "Either a scar over all of the surface, up to {scar_depth} deep on average, or a bent datum of the "
-    "instrument: both are possible.",
-    "scar_or_step": "Either a scar of {scar_depth} that reaches beyond the end of the traces, or a jump of the datum of the "
-    "instrument by this height: both are possible.",
-    "scar_or_drift": "Either wear of {scar_depth}, the mean over {region}, or drift of the instrument: both are possible.",
-    "elsewhere": "Not comparable: no common part of both surfaces is found, and no unworn flanks of a track show a depth.",
-    "no_datum": "No worn depth: the place is the same, but too few heights agree ({unworn} of all) to measure depths from.",
-    "mirror_finish": "Not comparable: the short waves of the surface (rms height {rq}) hardly exceed the noise ({noise}).",
-    "identical": "No wear: both files hold the same heights; was the same file given twice?",
-}
-# Second sentence where there is no worn depth: what would be seen, or what to do.
-NO_DEPTH_ADVICE = {
-    "no_wear": "A track over the middle third with unworn flanks is found from a mean depth of {detection_limit} on.",
-    "elsewhere": "Measure the same place again, or across the whole track with unworn surface on both sides.",
-    "no_datum": "Measure a longer part, so that more of the unworn surface is on both traces.",
-    "mirror_finish": "Measure with less noise; for traces, the start may be marked on the part and its shift given.",
-    "growth_at_ends": "Measurements that end on unworn surface on both sides would decide.",
-    "scar_or_drift": "The unworn parts drift so much that one of many places may look as deep; comparing two measurements "
-    "of the worn surface would show the drift alone.",
-    "scar_or_step": "Traces with unworn surface on both sides of the scar, or a second measurement, would decide.",
-    "scar_or_bow": "Longer traces with unworn surface on both sides, or a datum that is known to be straight, would decide.",
-}
-# Headline and advice of scans where they differ; flanks are those of a track in a trace.
-SCAN_VERDICTS = {
-    "elsewhere": (
-        "Not comparable: no part of the first scan is found in the second one.",
-        "Measure the same place again, with more of the unworn surface beside the track.",
-    ),
-    "no_wear": (
-        VERDICT_HEADLINES["no_wear"],
-        "A worn square as large as those that are tested, up to 25 x 25 points, is not seen below a mean depth of "
-        "{detection_limit}.",
-    ),
-}
-# Sentences on findings: further sentences of the verdict, warnings, and notes.
-VERDICT_FINDINGS = {
-    "no_old_surface_left": "From {from} to {to} nothing of the first surface is left; the depth is measured below "
-    "the unworn flanks.",
-    "bow_subtracted": "A bow of {height} over the common length was subtracted, because a bent datum and wear of this shape "
-    "look alike; it would be a worn area of {area}.",
-    "hidden_even_wear": "Wear that is even or wedge-shaped over all of {region}{limit} looks like a shift or tilt of the "
-    "datum and is not in these depths.",
-    "worn_tops": "Only the tops are lost; the valleys between them are those of the first surface.",
-}
-FINDING_WARNINGS = {
-    "other_gain": "All heights after wear are {gain} times those before, as another gain of the instrument would make "
-    "them, and wear does not; calibrate z of both measurements.",
-    "likely_place": "The place is likely, not sure: there the surfaces agree by {significance} standard deviations more "
-    "than at other places, and more than {sure} make a place sure; compare their curves.",
-    "drift": "The datum drifts by {height} (rms), more than the noise of neighbouring depths ({noise}); the intervals "
-    "contain this error.",
-}
-FINDING_NOTES = {
-    "left_out": "{before} heights before wear and {after} after it are spikes, dropouts or dust and are left out; "
-    "--keep-spikes keeps them.",
-    "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from "
-    "the other end.",
-    "other_length": "Lengths in the second trace are {scale} ({low} to {high}) times those in the first.",
-}
+_SENTENCES = tomllib.loads(Path(__file__).with_name("sentences.toml").read_text(encoding="utf-8"))
+MISSING_VALUE_REASONS: dict[str, str] = _SENTENCES["reasons"]
 MISSING_NUMBER_TEXT = "any amount"  # stands for a missing number
-# Why a quantity has no value.
-MISSING_VALUE_REASONS = {
-    "elsewhere": "no common part of both surfaces is found",
-    "no_wear": "no wear is shown",
-    "no_track": "no track is shown",
-    "cut_off": "the track leaves the part that both surfaces show",
-    "noise": "the noise is as large as the roughness",
-    "short_track": "the track, or the surface beside it, is too short for a standard cut-off",
-    "scans": "only that of traces is compared",
-    "unresolved": "it is shorter than two steps, which do not resolve it",
-    "not_falling": "the autocorrelation does not fall to 0.2 within half of each side",
-    "no_limit": "even or wedge-shaped wear of any size looks like an offset or tilt of the datum",
-    "not_hidden": "unworn parts show where the datum is, so that no wear can hide",
-    "identical": "both files hold the same heights",
-    "no_datum": "too few heights agree to measure depths from",
-    "mirror_finish": "the short waves of the surface hardly exceed the noise",
-    "growth_at_ends": "a scar and growth at the ends are both possible",
-    "scar_or_bow": "a scar and a bent datum are both possible",
-    "scar_or_step": "a scar and a jump of the datum are both possible",
-    "scar_or_drift": "wear and drift of the instrument are both possible",
-    "flat": "the surface is flat",
-    "undetermined": "the heights do not determine it",
-    "band": "the surface is too short, or its step too long, for the waves of the band",
-    "sections": "no interval from fewer than five sections",
-    "few_files": "no interval from so few files",
-}
 # SI units of the numbers of findings other than lengths; of areas between traces, and of volumes between scans
 RATIO_NUMBERS = ("unworn", "scale", "low", "high", "gain", "significance", "sure")
 FINDING_NUMBER_UNITS = dict.fromkeys(RATIO_NUMBERS, "1")
@@ -202,35 +110,33 @@ def describe_comparison(comparison: Comparison) -> Words:
     fields["region"] = describe_region(comparison)
     if is_known(values.get("worn_depth_mean")):
         fields["mean"] = format_value("worn_depth_mean", values["worn_depth_mean"])
-    headline, advice = VERDICT_HEADLINES[code], NO_DEPTH_ADVICE.get(code, "")
-    if comparison.is_areal:
-        headline, advice = SCAN_VERDICTS.get(code, (headline, advice))
+    texts = {}
+    for kind in ("headlines", "advice"):
+        own = _SENTENCES["scans"][kind] if comparison.is_areal else {}
+        texts[kind] = own.get(code, _SENTENCES[kind].get(code, "")).format_map(fields)
 
     # The headline, then advice if no depth is known, or the loss.
-    verdict = [headline.format_map(fields)]
-    if code in NO_DEPTH_ADVICE:
+    verdict = [texts["headlines"]]
+    if texts["advice"]:
         # the limit of a track that would be found may be unknown
         if code != "no_wear" or numbers.get("detection_limit") is not None:
-            verdict.append(advice.format_map(fields))
+            verdict.append(texts["advice"])
     elif is_known(values.get("worn_depth_max")):
         verdict.append(_describe_loss(comparison))
     verdict += describe_waves(values.get("amplitude_ratio"))
 
     # The code of a finding tells whether it is a warning, a note or a sentence of the verdict.
-    warnings, notes = [], []
+    found = {"verdict": verdict, "warnings": [], "notes": []}
     for code, numbers in comparison.findings:
         fields = _format_numbers(numbers, comparison.is_areal)
         fields["region"] = describe_region(comparison)
-        if code in FINDING_WARNINGS:
-            warnings.append(FINDING_WARNINGS[code].format_map(fields))
-        elif code in FINDING_NOTES:
-            notes.append(FINDING_NOTES[code].format_map(fields))
-        else:
-            verdict.append(VERDICT_FINDINGS[code].format_map(fields))
-    notes = [*verdict[MAX_VERDICT_SENTENCES:], *notes]
+        for kind, sentences in _SENTENCES["findings"].items():
+            if code in sentences:
+                found[kind].append(sentences[code].format_map(fields))
+    notes = [*verdict[MAX_VERDICT_SENTENCES:], *found["notes"]]
     if any(is_known(quantity) and quantity.low is not None for quantity in values.values()):
         notes.append(INTERVALS_SENTENCE)
-    return Words(tuple(verdict[:MAX_VERDICT_SENTENCES]), tuple(warnings), tuple(notes))
+    return Words(tuple(verdict[:MAX_VERDICT_SENTENCES]), tuple(found["warnings"]), tuple(notes))
 
 
 def _describe_loss(comparison: Comparison) -> str:
