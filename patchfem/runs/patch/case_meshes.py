@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from . import grids, mesh_levels
-from .cases import Batch, CaseMeasures, Cases, make_cases, take_patch
+from .cases import Batch, CaseMeasures, Cases, MeshFact, make_cases, take_patch
 from .condensed import CondensedPair, condense
 from .measures import (
     MIN_CONTACT_EDGE_ERROR_IN_CELLS,
@@ -22,7 +22,7 @@ from .measures import (
     max_mesh_error_ratio,
 )
 from .press import Level, PressedCases, make_level, press_on_level
-from .values import find_contact_edges
+from .values import contact_reaches_steep_end, find_contact_edges
 
 # Largest number of contacts for which the meshes of many cases are graded: half of them equally spaced in the order of
 # their left ends, half in that of their right ends
@@ -87,6 +87,15 @@ def join_places(parts: list[ContactPlaces]) -> ContactPlaces:
         crossings[first : first + n_contacts, :n_crossings] = part.crossings
         first += n_contacts
     return ContactPlaces(np.concatenate([part.begins for part in parts]), crossings)
+
+
+def collect_facts(pressed: PressedCases) -> np.ndarray:
+    """Return what texts state about the mesh of pressed cases, as rows `MeshFact` (f, n)."""
+    facts = np.zeros((len(MeshFact), len(pressed)))
+    facts[MeshFact.N_NODES] = pressed.x.size
+    facts[MeshFact.COUPLING] = pressed.level.pair.coupling
+    facts[MeshFact.STEEP_END] = contact_reaches_steep_end(pressed)
+    return facts
 
 
 class PressedParts(NamedTuple):
@@ -182,8 +191,10 @@ class _CaseSolver:
         columns += [[one.floor for one in measures]]
         values, errors, floors = np.array(columns, float)[:, :, None]
         excess = np.array([max_mesh_error_ratio(fine.measures, self.tolerance)])
-        found = CaseMeasures(tuple(fine.measures), values, errors, floors, excess)
-        self.batch.put(np.array([number]), found, fine.x.size)
+        found = CaseMeasures(
+            tuple(fine.measures), values, errors, floors, excess, collect_facts(fine.pressed)
+        )
+        self.batch.put(np.array([number]), found)
 
     def _solve_together(self, numbers: np.ndarray) -> np.ndarray:
         """Solve cases (k,) on common meshes; return the numbers of those that miss the tolerance.
@@ -301,10 +312,11 @@ class _CaseSolver:
             estimates.errors,
             estimates.floors(self.tolerance, length),
             excess,
+            collect_facts(pressed),
         )
         is_solved = np.ones(len(pressed), bool)
         is_solved[list(errors)] = False
-        self.batch.put(numbers[is_solved], found.take(is_solved), pressed.x.size)
+        self.batch.put(numbers[is_solved], found.take(is_solved))
         return excess > 1
 
 
