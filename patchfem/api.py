@@ -411,14 +411,14 @@ def cost(
     say: Callable[[str], None] | None = None,
     **sets: Any,
 ) -> dict[str, Any]:
-    """Measure numerical error against CPU time for several tolerances, or for values of one setting.
+    """Measure numerical error against CPU time for several tolerances and over the mesh or the steps.
 
     Parameters
     ----------
     scene : path, str, dict, Scene or Model
         As for `build`.
     over : str, optional
-        Setting to vary instead of the tolerance: "element_size", "steps_per_cycle", "shear_modes" or "jumps".
+        Only setting to vary: "element_size", "cells", "steps_per_cycle", "shear_modes" or "jumps".
     out : path, optional
         Folder for cost.csv and the page. Default: no files are written.
     say : callable, optional
@@ -429,11 +429,12 @@ def cost(
     Returns
     -------
     dict
-        The output of `patchfem cost --json`: an entry "tolerance", or one with the name of the setting, with the list
-        `runs`. Each run has its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error
+        The output of `patchfem cost --json`: an entry "tolerance", and one with the name of the setting, each with the list
+        `runs`; and the list `convergence` with the finest value, the observed order and the relative `changes` of each
+        measure. Each run has its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error
         (relative to the allowed error at a tolerance of 1), `meets_tolerance`, the advice from its warnings as `remedies`,
-        and for each measure its value in `values` and its error estimate in `errors`, in SI units. For a setting,
-        the entry has `sentence`.
+        and for each measure its value in `values` and its error estimate in `errors`, in SI units. The entry of a setting
+        has `sentence`.
 
     Raises
     ------
@@ -452,10 +453,8 @@ def cost(
     """
     model = build(scene, **sets)
     over = numerical_settings.SCENE_KEYS.get(_require_string(over, "cost: over"), over)
-    setting = over or cost_curves.TOLERANCE_SETTING
     report = _print_to_stderr if say is None else say
-    curve = cost_curves.compute_setting_costs(model, setting, report)
-    answer = costs.make_answer({setting: curve}, model)
+    answer = costs.make_answer(cost_curves.compute_costs(model, over, report), model)
     if out is not None:
         _save(lambda _: answer, out)
     return answer.details
