@@ -138,7 +138,6 @@ def compare_kind(kind: str, n: int, n_compared: int | None = None) -> list[float
         for name in data
         if f"{name}_error" in data
     }
-    floors = {name: data.get(f"{name}_floor", 0 * data[name]).values.ravel() for name in columns}
 
     ratios = []
     for case, row in list(enumerate(rows))[:n_compared]:
@@ -148,7 +147,9 @@ def compare_kind(kind: str, n: int, n_compared: int | None = None) -> list[float
         for name, (values, errors) in columns.items():
             # The case meets its tolerance, or says why not.
             if np.isfinite(errors[case]):
-                allowed = tolerance * abs(values[case]) + floors[name][case]
+                floor = f"{name}_floor"
+                allowed = tolerance * abs(values[case])
+                allowed += data[floor].values.ravel()[case] if floor in data else 0
                 assert errors[case] <= allowed or row["message"], (kind, case, name)
 
             # A value that both have differs by no more than both errors.
