@@ -31,11 +31,6 @@ PUBLIC = {
         "CaseResults",
         "FAILED_OUTCOME",
     ),
-    "batch.meshes": (
-        "NO_SHARED_MESHES",
-        "SharedMeshes",
-        "with_shared_meshes",
-    ),
     "batch.motion_observer": ("MotionObserver",),
     "bench.engine": (
         "choose_smooth_bond_summation",
