@@ -190,6 +190,8 @@ class _Passes:
         meshes of the pass before are not solved again.
         """
         start = process_time()
+        if model.has_interface_patches:
+            model = joint.press_interfaces(model)
         run_plan = replace(self.plan, model=model)
         warnings = list(model.source.remarks)
         notes = list(model.source.notes)

@@ -754,6 +754,7 @@ def make_histories(run: March, rows) -> Response:
     if grooves is not None and grooves.lifted_mass:
         sliding = find_accelerations(modes, push, z, rate, pull) @ modes.slide
         motion = slides[:, 0], rates[:, 0], sliding
-        extra["normal_load"] = contact.preload + grooves.lifted_mass * grooves.find_lift(*motion)
+        load = contact.preload if contact.load is None else contact.load(time)
+        extra["normal_load"] = load + grooves.lifted_mass * grooves.find_lift(*motion)
 
     return make_response(modes, run.drive, push, (time, z, rate), pull, interfaces, extra)

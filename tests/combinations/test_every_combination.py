@@ -33,6 +33,7 @@ EFFECTS = (
     "shear and pitch",
     "grooves",
     "shear and grooves",
+    "load and grooves",
     "cubic spring",
     "interfaces",
     "shear of interfaces",
@@ -41,6 +42,7 @@ EFFECTS = (
     "bench with lower",
     "bench with load",
     "bench with grooves",
+    "bench with load and grooves",
 )
 # A patch so long that its slide over the pressure of the lower piece is small
 LONG = {'length = "12.7 mm"': 'length = "127 mm"', '"1.2 mm"': '"12 mm"', '"10 m"': '"1000 m"'}
@@ -142,6 +144,11 @@ def make_scenes(effect: str, law: str) -> tuple[str, str, str]:
             STIFF + SHEAR + CARVED.format("contact", "1e-6 um") + friction + RIG,
             patch + RIG,
         ),
+        "load and grooves": (
+            POINT + OSCILLATING.format("60 N") + CARVED.format("normal", "1 um") + friction + RIG,
+            POINT + OSCILLATING.format("1e-6 N") + CARVED.format("normal", "1 um") + friction + RIG,
+            POINT + CARVED.format("normal", "1 um") + friction + RIG,
+        ),
         "cubic spring": (
             point + RIG.replace("[drive]", cubic.format(1e15)),
             point + RIG.replace("[drive]", cubic.format(1e3)),
@@ -174,6 +181,11 @@ def make_scenes(effect: str, law: str) -> tuple[str, str, str]:
             POINT + CARVED.format("normal", "1e-6 um") + friction + BENCH,
             point + BENCH,
         ),
+        "bench with load and grooves": (
+            POINT + OSCILLATING.format("60 N") + CARVED.format("normal", "1 um") + friction + BENCH,
+            POINT + OSCILLATING.format("60 N") + CARVED.format("normal", "1e-6 um") + friction + BENCH,
+            POINT + OSCILLATING.format("60 N") + friction + BENCH,
+        ),
     }  # fmt: skip
     # Points that stick rigidly need short steps.
     n_steps = 1600 if law in ("coulomb", "convolution") else 400
@@ -189,6 +201,18 @@ def run_measures(text: str) -> dict:
     """Return the values of the measures of a scene, without error estimates."""
     measures = run_scene(text, estimate=False).measures
     return {name: measure.value for name, measure in measures.items()}
+
+
+def test_stiffness_under_an_approach_has_the_loop_of_the_load():
+    """A law with a stiffness has the same loop under the approach of a load as under the load, also at an interface."""
+    distance = run_measures(STEEL)["approach"]
+    rig = STEEL + "[friction]\nstatic = 0.3\n" + LAWS["stiffness"] + RIG
+    for text in (rig, make_scenes("shear of interfaces", "stiffness")[0]):
+        given = text.replace('load = "116 N"\n', f'approach = {{distance = "{distance!r} m"}}\n')
+        assert given != text
+        assert run_measures(given)["loop_area"] == pytest.approx(
+            run_measures(text)["loop_area"], rel=1e-9
+        )
 
 
 COMBINATIONS = [(effect, law) for effect in EFFECTS for law in LAWS]

@@ -239,12 +239,10 @@ def _list_numbers(model: Model) -> tuple[float, ...]:
     law = Bonds(friction.static, friction.bond_length) if has_bonds else make_law(friction, load)
     cycles = int(rig.drive.cycles)
 
-    # Stiffness during stick: friction limit / bond length for laws with a length.
+    # Stiffness during stick
     stiffness = 0.0
-    if friction.law == "elastic-plastic" or has_bonds:
-        stiffness = friction.static * load / friction.bond_length
-    elif friction.law not in ("coulomb", "tanh"):
-        stiffness = friction.stiffness
+    if not law_has_trait(friction.law, "memoryless"):
+        stiffness = friction.static * load / law.length
 
     # The order is that of `collect_cases`: `Number`, law, memory, stiffness of the mode, `Scales`.
     return (

@@ -77,7 +77,8 @@ def make_contact(model: Model, numerics, patch):
     limit = sum(float(point_set.law.limits.sum()) for point_set in sets)
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     if model.grooves is not None:
-        limit = model.grooves.max_force(fields["preload"], model.friction.static)
+        load = model.point.load if patch is None else float(patch.pressure.load)
+        limit = model.grooves.max_force(load, model.friction.static)
     return join_points([*sets, *springs], limit or scale, fields)
 
 

@@ -164,7 +164,8 @@ class Numerics:
     - cycles, window: number of cycles of the run, and of the window at its end.
     - shear_modes: number of shear modes; None: set by the tolerance.
     - choice: method of bond summation; None: set by the tolerance and the steps.
-    - whole: whether the run stores the histories before the window; coarse runs may omit them.
+    - whole: whether the run stores the histories before the window, or draws the response curve beside its peak; coarse runs
+      may omit them.
     - local: largest relative error per step of the engine `hybrid`.
     - other_rig: index of the rig with other modes of a reduced structure, or None.
     - meshed: indices of the interfaces whose patches have a coarser mesh.

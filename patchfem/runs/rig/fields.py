@@ -67,7 +67,9 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
         reduction = getattr(solution.contact, "reduction", None)
-        length = 0.0 if reduction is None else friction.record.make_law(f).length
+        length = (
+            0.0 if reduction is None else friction.record.make_law(f, patch.pressure.load).length
+        )
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
         tau, local = slip.fields.compute_element_fields(patch, reduction, states, length)
         if model.patch.area is None:

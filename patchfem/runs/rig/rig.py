@@ -302,6 +302,8 @@ def _run_rig(inputs: RunInputs) -> Result:
         )
 
     numerics = choose_numerics(model)
+    if not inputs.plan.draws_curve and ENGINES[numerics.engine].finds_periodic_motion:
+        numerics = replace(numerics, whole=False)
     if numerics.engine == "march":
         bond_lists.refuse_unresolved_bond_vibration(model, numerics)
     try:

@@ -131,7 +131,8 @@ ELEMENT_LAWS = [
 MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its keys.
     "rig": "`[drive]` with `[friction]` or `[[structure.interface]]`",
     "load on a point": "`[normal]`",
-    "single contact point": "in a rig: `[normal]`",
+    "mode that turns or lifts a joint without places": "a mode with yaw and no `[contact.area]`, or a mode with heave or "
+    "pitch and `[normal]`",
     "drive other than a sine": "`drive.kind` is `free`, or `drive.waveform` is not `sine`",
     "sensor apart from the output": "`accelerometer` or `gauge` of a `[[structure.mode]]` differs from its `output`",
     "output that bounds the motion": "`structure.travel`, `structure.stiffening`, `drive.kind` is `free`, or "
@@ -141,15 +142,13 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "nonlinear asperities": "`patch.asperities.law` is `exponential` or `hertz`",
     "mode with heave or pitch": "`normal` or `pitch` of a `[[structure.mode]]` is not 0, or `structure.normal_at` or "
     "`structure.pitch_at` is given",
+    "changing load or grooves": "a changing load, or grooves",
     "changing load": "in a rig: `normal.amplitude`, or a mode with heave or pitch",
     "mode with yaw": "`yaw` of a `[[structure.mode]]` is not 0",
-    "memory of the slip": "a law with stretch or bonds, or partial slip",
     "kinetic below static": "law that sticks rigidly, with `kinetic` less than `static`",
-    "bonds of a given stiffness": "`stiffness` of a law that takes `bond_length` in its place",
     "bonds that no force can move": "law nonlocal with reading 'report', -1 < `order` < 0 and `initial_bonds` > 0",
     "partial slip": "`[patch.shear]`, `patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`",
     "shape on the lower piece": "`on` is `lower` in " + join_words(SHAPES, "or"),
-    "patch without a face": "no `[contact.area]`",
     "shapes on different pieces": "`on` is `upper` in one and `lower` in another of " + join_words(SHAPES, "and"),
     "bands that slip together": "another law than " + join_words(ELEMENT_LAWS, "or"),
     "grooves": "`[contact.grooves]` or `[normal.grooves]`, with `amplitude` > 0",
