@@ -32,7 +32,7 @@ MENU_POSITION = {
 
 def make_plotly_figure(panel: Panel) -> Figure:
     """Return the figure of a panel: `data`, `layout`, and `frames` of a film."""
-    figure = {"data": _make_traces(panel), "layout": _make_layout(panel)}
+    figure = {"data": make_traces(panel), "layout": _make_layout(panel)}
     if panel.choices:
         _add_menu(figure, panel.choices)
     elif panel.style == "film":
@@ -74,7 +74,7 @@ def _make_vertical_line(position: float) -> Figure:
     return {"type": "line", "yref": "paper", "line": line} | ends
 
 
-def _make_traces(panel: Panel) -> list[Figure]:
+def make_traces(panel: Panel) -> list[Figure]:
     """Return the traces of a panel; those of a film have the same range of colours."""
     if panel.style in ("map", "film"):
         traces = [_make_map_trace(curve, panel.colour_label) for curve in panel.curves]
@@ -88,7 +88,7 @@ def _make_traces(panel: Panel) -> list[Figure]:
         if panel.style == "overlay":
             place = number / max(len(panel.curves) - 1, 1)
             mixed = [np.interp(place, (0, 0.5, 1), part) for part in zip(*OVERLAID_CURVE_COLOURS)]
-            colour = "rgb({:.0f},{:.0f},{:.0f})".format(*mixed)
+            colour = "#{:02x}{:02x}{:02x}".format(*map(round, mixed))
         style = "line" if curve.is_line else panel.style
         groups.append((curve.weight, _make_curve_traces(curve, style, colour)))
     # later traces lie above earlier ones
@@ -159,7 +159,7 @@ def _make_map_trace(curve: Curve, label: str) -> Figure:
 
 def _add_menu(figure: Figure, choices: list[Panel]) -> None:
     """Add a menu that shows one of several panels at a time."""
-    groups = [_make_traces(choice) for choice in choices]
+    groups = [make_traces(choice) for choice in choices]
     buttons = []
     for number, choice in enumerate(choices):
         visible = [k == number for k, group in enumerate(groups) for _ in group]
