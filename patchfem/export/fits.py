@@ -170,7 +170,8 @@ def _make_headline(details: JsonObject, measures: Quantities) -> str:
     named = list(measures.items())[:MAX_HEADLINE_VALUES]
     text = ", ".join(f"{key} = {format_quantity(key, one)}" for key, one in named)
     if len(measures) > len(named):
-        text += f" and {len(measures) - len(named)} more"
+        count = len(measures) - len(named)
+        text += f" and {count} more key{'s' * (count > 1)}"
     if details["outcome"] != "done":
         return f"The fit to {details['measured']} did not converge; best values so far: {text}."
     return f"Fitted to {details['measured']}: {text}."
