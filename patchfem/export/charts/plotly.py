@@ -19,6 +19,7 @@ STATE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")
 OVERLAID_CURVE_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))
 ERROR_BAND_OPACITY = 0.18  # opacity of an error band, 1 for the colour of its curve
 FILM_FRAME_MILLISECONDS = 120
+AREA_MARGIN_FRACTION = 0.02  # room beside a filled curve, relative to its length; less is not seen
 # figure of plotly.js, or a part of it, as an object of its JSON
 Figure = dict[str, Any]
 # Position of a menu, above its chart.
@@ -48,6 +49,11 @@ def _make_layout(panel: Panel) -> Figure:
         "yaxis": _make_axis_layout(panel.y),
         "showlegend": not is_film and sum(bool(curve.name) for curve in panel.curves) > 1,
     }
+    if panel.style == "area":
+        # the peaks at the ends of a contact do not lie on the frame
+        x = panel.curves[0].x
+        room = AREA_MARGIN_FRACTION * np.ptp(x)
+        layout["xaxis"]["range"] = [x.min() - room, x.max() + room]
     if panel.marks:
         layout["shapes"] = list(map(_make_vertical_line, panel.marks))
     if is_film or (panel.style == "map" and panel.y.label.startswith("y")):
