@@ -48,7 +48,6 @@ from .export.charts import axes as chart_axes
 from .export.fields import grids
 from .export.folder import Folder
 from .export.surfaces import compare as compared
-from .export.surfaces import pairs as compared_pairs
 from .export.surfaces import roughness, worn
 from .export.sweeps import dataset as sweep_datasets
 from .export.sweeps import run as sweep_run
@@ -1249,7 +1248,7 @@ def compare(
             raise PatchfemError(
                 "compare: give the table of pairs alone, without files or predicted"
             )
-        return compared_pairs.answer_pairs(_require_path(pairs, "compare: pairs"), options).details
+        return compared.answer_pairs(_require_path(pairs, "compare: pairs"), options).details
     if len(files) == 4:
         raise PatchfemError(describe_removed("compare of four files"))
     if len(files) != 2:

@@ -14,7 +14,6 @@ from ..results.patch_rows import Arrays
 from ..results.result import (
     N_INTERFACE_FRAMES,
     SlipRule,
-    collect_rest_frame,
     compute_status,
     make_interface_frames,
 )
@@ -37,9 +36,6 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     sigma = patch.pressure.sigma_n
     f = model.friction
     window = solution.window
-    # Bands that slide independently have no common shear stress.
-    if model.partial_slip and model.rig.friction.bands_slide_apart:
-        return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)
     # A motion without snapshots is that of a single point.
