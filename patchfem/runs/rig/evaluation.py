@@ -8,7 +8,7 @@ level: there is a `Level` with errors for each of them, the onset level found by
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -278,19 +278,10 @@ def add_level_errors(
     return tuple(levels_with_errors)
 
 
-class Onset(NamedTuple):
-    """Drive level of an onset, which lies between two levels of a bisection.
-
-    - level: mean of both levels [m s-2].
-    - error: half their difference [m s-2].
-    """
-
-    level: float
-    error: float
-
-
-def find_onset(drive_levels, run_level, tolerance: float, is_past_onset) -> Onset | None:
-    """Find the drive level [m s-2] of the onset by bisection, with its uncertainty; None if no level reaches the onset.
+def find_onset(
+    drive_levels, run_level, tolerance: float, is_past_onset
+) -> tuple[float, float] | None:
+    """Find the drive level of the onset by bisection, with its uncertainty, both [m s-2]; None if no level reaches it.
 
     The bisection starts between the last level before the onset and the first level after it, and
     ends when the bracket is smaller than `tolerance` times the level. If there is no level before
@@ -323,7 +314,7 @@ def find_onset(drive_levels, run_level, tolerance: float, is_past_onset) -> Onse
             high = middle
         else:
             low = middle
-    return Onset((low + high) / 2, (high - low) / 2)
+    return (low + high) / 2, (high - low) / 2
 
 
 def measure_onset_level(rig, solution, tolerance: float) -> Measure:
@@ -341,7 +332,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     unit, factor = _find_level_unit(rig)
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
 
-    def find(run) -> Onset | None:
+    def find(run) -> tuple[float, float] | None:
         """Return the onset of slip in a run with drive levels, or None if no level reaches it."""
         return find_onset(run.levels, run.run_level, tolerance, is_past_onset)
 
@@ -354,7 +345,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
         coarse_onset = find(run)
         reference = onset if beside is None else find(beside)
         is_missing = coarse_onset is None or reference is None
-        error += level if is_missing else abs(coarse_onset.level - reference.level)
+        error += level if is_missing else abs(coarse_onset[0] - reference[0])
     return Measure(factor * level, unit, factor * error, 1e-9)
 
 
