@@ -13,10 +13,7 @@ PUBLIC = {
         "interpolate_nodes",
     ),
     "files": ("find_file_faults",),
-    "law": (
-        "InterfaceLaw",
-        "make_bond_parameters",
-    ),
+    "law": ("make_bond_parameters",),
     "model": (
         "Model",
         "build",

@@ -23,7 +23,6 @@ it:
 PUBLIC = {
     "findings": ("compute_accuracy_curve",),
     "batch.case_results": ("CaseResults", "FAILED_OUTCOME"),
-    "batch.meshes": ("with_shared_meshes",),
     "patch.mesh_levels": ("solve_with_coarser",),
     "pieces": ("PieceFields", "Pieces", "compute_pieces"),
     "results.patch_rows": ("PATCH_TABLE",),

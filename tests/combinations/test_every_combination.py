@@ -27,6 +27,7 @@ LAWS = {
 EFFECTS = (
     "shear",
     "yaw",
+    "shear and yaw",
     "lower",
     "load",
     "pitch",
@@ -121,6 +122,9 @@ def make_scenes(effect: str, law: str) -> tuple[str, str, str]:
         "shear": (STEEL + SHEAR + friction + RIG, STIFF + SHEAR + friction + RIG, patch + RIG),
         "yaw": (
             area + yawing.format(20), area + yawing.format(1e-6), area + RIG
+        ),
+        "shear and yaw": (
+            area + SHEAR + yawing.format(20), area + SHEAR + yawing.format(1e-6), area + SHEAR + RIG
         ),
         "lower": (lower + friction + RIG, long_lower + friction + RIG, long + friction + RIG),
         "load": (

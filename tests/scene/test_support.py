@@ -36,7 +36,6 @@ SETS = {
     "nonlinear asperities": EXPONENTIAL,
     "output that bounds the motion": "structure.travel=1_mm",
     "mode with heave or pitch": "structure.mode.second.pitch=1_rad/m",
-    "mode with yaw": "structure.mode.second.yaw=1_rad/m",
     "normal.amplitude": "normal.amplitude=5_N normal.frequency=50_Hz",
     "partial slip": "{patch}.shear={{}}",
     "patch.grooves": "{patch}.grooves.wavelength=80_um {patch}.grooves.amplitude=1_um",
@@ -54,11 +53,6 @@ SETS = {
 }  # fmt: skip
 # Property of a joint in a message, after re.escape
 PROPERTY = re.compile(r"\\\{.*?\}")
-# More assignments for rows whose scene has, with the assignments of its features alone, those of another row, too.
-MORE_SETS = {
-    "mode with yaw, bands that slip together, partial slip": f"{BONDS} {{patch}}.area.cells=64",
-    "wear, mode with yaw, partial slip": "{law}.law=coulomb {patch}.area.cells=64",
-}
 REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
     '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\nboundary = [1, 2]\nslide = [1, 0]\n'
     + LINEAR[LINEAR.index("[drive]") :]
@@ -100,8 +94,7 @@ def list_refusals(names: str) -> list[str]:
     """Return the messages about combinations that no run supports, for a scene with the features of a row."""
     features = names.split(", ")
     text, words = choose_base(set(features))
-    assignments = [*(SETS.get(name, "") for name in features), MORE_SETS.get(names, "")]
-    sets = " ".join(assignments).format_map(words).split()
+    sets = " ".join(SETS.get(name, "") for name in features).format_map(words).split()
     try:
         loads(text, "a.toml", [write_blanks(assignment) for assignment in sets])
     except SceneError as refused:

@@ -70,6 +70,8 @@ def make_contact(model: Model, numerics, patch):
             moves = "sets" in fields
             count = numerics.shear_modes
             sets = [make_points(model, part, count, moves=moves) for part in surfaces]
+            if rig.friction.bands_slide_apart and model.partial_slip:
+                sets = sets[0].split(bands.number_bands(patch)[sets[0].shear.points], rows)
 
     # Without friction the drive gives the scale of the forces.
     limit = sum(float(point_set.law.limits.sum()) for point_set in sets)
@@ -105,9 +107,14 @@ def _find_load(model: Model, patch) -> dict:
 
 
 def _list_element_joints(model: Model, numerics, patch) -> list[joints.Joint]:
-    """Return the interfaces as joints of parallel elements where all that slip part by part have them; [] elsewhere."""
+    """Return the interfaces as joints of parallel elements where all that slip part by part have them; [] elsewhere.
+
+    Bands that yaw deform the same pieces, so that their elements are not parallel.
+    """
     parts = joints.list_loaded_interfaces(model, patch, numerics.meshed)
-    if any(part.patch is not None and part.patch.model.gap.side == "lower" for part in parts):
+    patches = [part.patch for part in parts if part.patch is not None]
+    is_below = any(solved.model.gap.side == "lower" for solved in patches)
+    if is_below or model.rig.friction.bands_slide_apart:
         return []
     soft_keys = [part.keys for part in parts if part.is_soft]
     if not soft_keys or not all(map(joints.has_elements, soft_keys)):

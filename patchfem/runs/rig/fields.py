@@ -39,9 +39,6 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     sigma = patch.pressure.sigma_n
     f = model.friction
     window = solution.window
-    # Bands that slide independently have no common shear stress.
-    if model.partial_slip and model.rig.friction.bands_slide_apart:
-        return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)
     # A motion without snapshots is that of a single point.

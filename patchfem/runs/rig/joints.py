@@ -20,7 +20,6 @@ from ...hybrid.laws import grooves, masing
 from ...hybrid.records import LawNumbers
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
-from ...model.structure import N_YAW_BANDS
 from ..bench import averaged_law
 from ..patch import faces, jenkins_elements
 from ..results.interfaces import depends_on_pressure
@@ -232,21 +231,12 @@ def _list_parts(model: Model, part: LoadedInterface) -> list[tuple[Load, tuple]]
     The elements are those of a patch that slips node by node, as the last fields of a Joint: stiffness, yield
     displacement and JenkinsSet. They are () for a patch that slips as a whole.
     """
-    slide_apart = model.rig.friction.bands_slide_apart
-    patch = part.patch
+    if model.rig.friction.bands_slide_apart:
+        return [(Load(float(load)), ()) for load in bands.compute_band_loads(part.patch)]
     if not (part.is_soft and has_elements(part.keys)):
-        if not slide_apart:
-            return [(part.load, ())]
-        return [(Load(float(load)), ()) for load in bands.compute_band_loads(patch)]
-
-    static = part.keys.static
+        return [(part.load, ())]
     length = friction.record.make_law(part.keys, part.load.mean).length
-    if slide_apart:
-        numbers = bands.number_bands(patch)
-        found = jenkins_elements.elements(patch, static, length)
-        parts = slip.first_loading.list_band_sliders(found, numbers, N_YAW_BANDS)
-        return [(part.load, sliders) for sliders in parts]
-    return [(part.load, jenkins_elements.make_elements(patch, static, length))]
+    return [(part.load, jenkins_elements.make_elements(part.patch, part.keys.static, length))]
 
 
 # ---- engine `hybrid`

@@ -231,15 +231,9 @@ def _warn_of_overhang(run) -> Iterator[str]:
 
 
 def _note_on_fields_of_bands(run) -> Iterator[str]:
-    """Note what bands that yaw neglect: the shear between them, and the fields of slip if they slip part by part."""
-    if not run.model.rig.friction.bands_slide_apart:
-        return
-    yield (
-        f"the face yaws as {model_structure.N_YAW_BANDS} bands of cells, each with its part of the friction and stiffness "
-        "of the whole face; the shear between bands that slide apart is neglected"
-    )
-    if run.model.partial_slip:
-        yield "bands that slip part by part have no common shear stress, so the fields contain only the pressure"
+    """Note that bands yaw as a whole."""
+    if run.model.rig.friction.bands_slide_apart:
+        yield f"the face yaws as {model_structure.N_YAW_BANDS} bands of cells, each with the displacement of its middle"
 
 
 def _note_on_elements_without_slip(run) -> Iterator[str]:

@@ -20,7 +20,6 @@ from ...effects import (
     describe_unsupported,
     find_waveform,
     law_has_trait,
-    law_supports,
 )
 from ..keys.contact import Contact
 from ..keys.tables import Friction
@@ -230,15 +229,6 @@ JOINT_FEATURES = {
     "shapes on different pieces": Feature(
         lambda j: j.opposite_shape, "{opposite_shape}", "a shape on each piece"
     ),
-    "bands that slip together": Feature(
-        lambda j: (
-            j.law in LAWS
-            and not (law_supports(j.table, "pieces") and law_supports(j.table, "shear"))
-        ),
-        "",
-        "law '{law}'",
-    ),
-    "mode with yaw": Feature(lambda j: j.yaw, "{yaw}"),
     "grooves": Feature(lambda j: not j.is_interface and j.grooves, "contact.grooves", "{grooves}"),
     # interfaces
     "interface": Feature(lambda j: j.is_interface, "{table_key}", "[[structure.interface]]"),
