@@ -38,8 +38,8 @@ MAX_UNCHECKED_TAIL_RATIO = 1e-2
 COMPARISON_TAIL_FACTOR = 0.1
 
 
-def list_time_runs(model: Model, numerics: Numerics) -> ComparisonRuns:
-    """List the comparison runs of a model that are coarser in time than the run with some Numerics.
+def list_time_runs(numerics: Numerics) -> ComparisonRuns:
+    """List the comparison runs that are coarser in time than the run with some Numerics.
 
     Time steps have runs with half and with a quarter of them, and the engine `hybrid` one with larger steps. The solver of
     steady motions estimates the errors of its steps itself.

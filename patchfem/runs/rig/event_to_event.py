@@ -408,7 +408,7 @@ class LumpedEvaluator(RunEvaluator):
                 errors[name] = error + row.sample_error / LATE_SAMPLES_PER_CYCLE
         return errors
 
-    def collect_solution_fields(self, run, drive) -> Fields:
+    def collect_solution_fields(self, run) -> Fields:
         """Return the free vibration that remains after the last slip of a release, by the name of its field in `Solution`.
 
         No interface slips any more, so that the rig is linear. The dict is empty for other drives and nonlinear springs.

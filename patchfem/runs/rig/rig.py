@@ -400,7 +400,7 @@ def estimate_slide_errors(model, patches, run: "bench.BenchRun", steps: int) -> 
     """
     solution = slides.make_slide_solution(run)
     numerics = Numerics(BENCH.name, steps, model.slide.cycles, 1, None, run.engine.choice)
-    runs = comparisons.list_time_runs(model, numerics)
+    runs = comparisons.list_time_runs(numerics)
     runs += comparisons.list_space_runs(model, numerics, patches[0], len(patches) - 1, solution)
     return Runner(model, patches).estimate_errors(runs, solution)
 
@@ -459,7 +459,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
             runner.solutions[coarser.numerics] = coarser.solution
             solution = runner.solve(numerics, inputs.say)
             inputs.seconds[stage] = solution.seconds
-        time_runs = comparisons.list_time_runs(model, numerics)
+        time_runs = comparisons.list_time_runs(numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
         step_runs = list_step_runs(numerics.steps, solution, time_runs, runner.solutions)
         measures = add_errors(
