@@ -11,7 +11,7 @@ time or memory that would be needed. The meshes of a patch (`patch.mesh_levels`)
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from math import ceil, inf, log, log2
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -91,20 +91,8 @@ class RunLimit(NamedTuple):
     bytes: float = DEFAULT_MAX_BYTES
 
 
-NO_LIMIT = RunLimit(
-    inf, 0.0, bytes=inf
-)  # of meshes, which have a largest predicted time of their own
-
-
-class Refined(NamedTuple, Generic[Solution]):
-    """Last solution of a refinement.
-
-    - solution: the solution.
-    - shortage: Shortage if accuracy.max_seconds or accuracy.max_memory ended the refinement, else None.
-    """
-
-    solution: Solution
-    shortage: Shortage | None = None
+# of meshes, which have a largest predicted time of their own
+NO_LIMIT = RunLimit(inf, 0.0, bytes=inf)
 
 
 class WorstMeasure(NamedTuple):
@@ -126,8 +114,10 @@ def refine(
     judge: Callable[[Solution, list[float]], Verdict],
     limit: RunLimit,
     say: Callable[[str], None] | None = None,
-) -> Refined[Solution]:
+) -> tuple[Solution, Shortage | None]:
     """Solve a problem with finer and finer resolutions, and return the last solution.
+
+    The second value is a Shortage if accuracy.max_seconds or accuracy.max_memory ended the refinement, else None.
 
     Parameters
     ----------
@@ -159,13 +149,13 @@ def refine(
         if resolution is not None:
             if verdict.bytes > limit.bytes:
                 shortage = Shortage(verdict.axis, verdict.bytes, "accuracy.max_memory")
-                return Refined(solution, shortage)
+                return solution, shortage
             spent = limit.clock() - limit.begin
             if spent + verdict.cost_ratio * verdict.seconds > limit.seconds:
-                return Refined(solution, Shortage(verdict.axis, spent + verdict.predict_seconds()))
+                return solution, Shortage(verdict.axis, spent + verdict.predict_seconds())
             if say is not None and verdict.reason:
                 say(verdict.reason)
-    return Refined(solution)
+    return solution, None
 
 
 def split_error(measure: Measure, name: str) -> Values:

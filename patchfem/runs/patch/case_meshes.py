@@ -272,7 +272,8 @@ class _CaseSolver:
                 return Verdict(self.batch.excess[done.numbers].max(initial=0.0))
             return Verdict(np.inf, finer)
 
-        return refine(press, bodies, judge, NO_LIMIT).solution.numbers
+        last, _ = refine(press, bodies, judge, NO_LIMIT)
+        return last.numbers
 
     def _press_parts(self, before: OpenCases, pair: CondensedPair, *, is_judged: bool) -> OpenCases:
         """Press cases on a mesh, in parts that limit the memory, and return those that go on.

@@ -208,7 +208,7 @@ def solve_on_refined_meshes(
         bodies = make_base_grids(patch_model).bodies
     meshes = _PatchMeshes(patch_model, tolerance, solved)
     if with_errors or solved:
-        patches = refine(meshes.press, bodies, meshes.judge, NO_LIMIT).solution
+        patches, _ = refine(meshes.press, bodies, meshes.judge, NO_LIMIT)
     else:
         for _ in range(MIN_NESTED_MESHES - 1):
             bodies = [body.refine() for body in bodies]
