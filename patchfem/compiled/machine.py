@@ -79,7 +79,9 @@ def _convert_array(array) -> tuple[str, bytes]:
 def _name_array_type(dtype: np.dtype, n_dimensions: int, flags: int) -> str:
     """Return the type code of arrays with a type, a number of dimensions and flags (`numpy.ndarray.flags.num`)."""
     if flags & C_ORDER:
-        flags &= ~FORTRAN_ORDER  # numba too reads an array of both orders, such as a row, as one of C order
+        flags &= (
+            ~FORTRAN_ORDER
+        )  # numba too reads an array of both orders, such as a row, as one of C order
     return f"{dtype.str}{n_dimensions}-{flags & NUMBA_FLAGS}"
 
 
