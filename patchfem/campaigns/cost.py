@@ -3,7 +3,7 @@
 In: a model, and the setting that varies. Out: a list of `Cost`, one per run, and sentences about the
 cheapest setting that meets a tolerance.
 
-Read `compute_setting_costs` first. Times are CPU seconds of this process and its child processes, which are hardly
+Read `compute_costs` first. Times are CPU seconds of this process and its child processes, which are hardly
 affected by other programs.
 """
 

@@ -32,15 +32,9 @@ from .answer import (
     make_columns,
     to_plain,
 )
+from .rows import make_variables
 from .runs import make_origin
 
-# columns of cost.csv that every run has: attribute -> heading and unit
-COST_FILE_COLUMNS = {
-    "label": ("setting", ""),
-    "seconds": ("seconds", "s"),
-    "wall_seconds": ("wall_seconds", "s"),
-    "timings": ("timings", ""),
-}
 # Tolerances for which a convergence table names the coarsest sufficient setting, by the name of their column
 SUFFICIENT_TOLERANCES = {"for_1_percent": 1e-2, "for_1_permille": 1e-3}
 MINUTE = 60.0  # CPU seconds
@@ -292,9 +286,11 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     `rows` are runs with their judgements, and `main` is the name of the main measure.
     """
     runs = [row.run for row in rows]
-    columns = {"knob": ([row.knob for row in rows], "")}
-    for attribute, (name, unit) in COST_FILE_COLUMNS.items():
-        columns[name] = ([getattr(run, attribute) for run in runs], unit)
+    columns = {"knob": [row.knob for row in rows], "setting": [run.label for run in runs]}
+    for name in ("seconds", "wall_seconds", "timings"):
+        columns[name] = [getattr(run, name) for run in runs]
+    data = make_variables("cost", **columns)
+    columns = {}
     units = {name: one.unit for run in runs for name, one in run.measures.items()}
     for name, unit in units.items():
         for heading, part in ((name, "value"), (f"error_{name}", "error")):
@@ -302,14 +298,17 @@ def _make_data(rows: list[Row], main: str) -> Variables:
             columns[heading] = (numbers, unit)
 
     # an exact run has no place on a logarithmic axis
-    columns["largest_error"] = ([row.worst.fraction or None for row in rows], "1")
-    columns["tolerance"] = ([run.tolerance for run in runs], "1")
-    columns["worst_measure"] = ([row.worst.name.replace("_", " ") for row in rows], "")
+    data |= make_columns("run", columns)
+    columns = {
+        "largest_error": [row.worst.fraction or None for row in rows],
+        "tolerance": [run.tolerance for run in runs],
+        "worst_measure": [row.worst.name.replace("_", " ") for row in rows],
+    }
     for name in ("nodes", "steps"):
         counts = [getattr(run, name) for run in runs]
         if any(counts):
-            columns[name] = (counts, "1")
-    data = make_columns("run", columns)
+            columns[name] = counts
+    data |= make_variables("cost", **columns)
     data |= {"main_measure": data[main], "main_measure_error": data[f"error_{main}"]}
 
     # a colour for each varied setting and for runs that miss the tolerance
@@ -326,15 +325,15 @@ def _make_convergence_data(converged: list[JsonObject]) -> Variables:
     """
     rows = [row for row in converged if is_main(row["measure"])] or converged
     has_several = len({row["setting"] for row in rows}) > 1
-    columns = {"point_seconds": ([], "s"), "point_change": ([], "1")}
+    points = {"point_seconds": [], "point_change": []}
     texts = []
     for row in rows:
         text = row["measure"] + f" over {row['setting']}" * has_several
         for seconds, change in zip(row["seconds"], row["changes"], strict=True):
             if change > 0:
-                columns["point_seconds"][0].append(seconds)
-                columns["point_change"][0].append(change)
+                points["point_seconds"].append(seconds)
+                points["point_change"].append(change)
                 texts.append(text.replace("_", " "))
     if not texts:
         return {}
-    return make_columns("point", columns) | {"point_measure": encode_texts("point", texts)}
+    return make_variables("cost", **points) | {"point_measure": encode_texts("point", texts)}

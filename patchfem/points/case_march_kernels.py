@@ -62,7 +62,7 @@ def count_repeated(cycle, same, before, case, now):
     return max(int(case[Number.CYCLES]) - N_READ - cycle, 0)
 
 
-@njit(cache=True, **NJIT_KERNEL)
+@njit(**NJIT_KERNEL)
 def march_cases(steps, parameters, laws, nows, seens, histories, loops):
     """March cases over their cycles.
 

@@ -41,7 +41,6 @@ PUBLIC = {
         "choose_smooth_bond_summation",
         "steps_per_cycle",
     ),
-    "bench.errors": ("estimate_bench_errors",),
     "joint": ("find_stuck_patch_stiffness",),
     "patch.faces": ("has_error_meshes",),
     "patch.jenkins_elements": ("elements",),
@@ -82,13 +81,13 @@ PUBLIC = {
     "rig.engines": (
         "ENGINES",
         "choose_numerics",
-        "estimate_hybrid_errors",
         "find_obstacle_of_map",
     ),
     "rig.plan": (
         "find_drive_and_knee",
         "stuck_stiffnesses",
     ),
+    "rig.rig": ("estimate_slide_errors",),
     "run": (
         "StateFile",
         "is_march",

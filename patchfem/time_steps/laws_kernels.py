@@ -32,7 +32,7 @@ def slide_points(law, numbers, memory, trial, values, count, step):
         slide_interlock(numbers, memory, trial, values, count, step)
 
 
-@njit(cache=True, **NJIT_KERNEL)
+@njit(**NJIT_KERNEL)
 def slide_law(law, numbers, memory, trial, values, count, step):
     """Slide a block of points as `slide_points`, for calls from Python."""
     slide_points(law, numbers, memory, trial, values, count, step)

@@ -208,7 +208,7 @@ def judge_sample(system, sample):
     return DONE
 
 
-@njit(cache=True, **NJIT_KERNEL)
+@njit(**NJIT_KERNEL)
 def march(system, n_steps, samples):
     """March over a number of whole steps, or find loads and forces of the points at the present state for 0 steps.
 

@@ -11,7 +11,7 @@ import patchfem as pf
 from patchfem import build
 from patchfem.campaigns import (
     Cost,
-    compute_setting_costs,
+    compute_costs,
     describe_best_setting,
     numerical_settings,
 )
@@ -61,7 +61,9 @@ def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch)
     monkeypatch.setattr(numerical_settings, "CELL_COUNT_FACTORS", (0.25, 1.0))
     patch = build_model(keys, 0.03)
     # The label of a row lists all settings with equal runs.
-    row = next(one for one in compute_setting_costs(patch, "element_size") if own in one.label)
+    row = next(
+        one for one in compute_costs(patch, "element_size")["element_size"] if own in one.label
+    )
     measures = run(patch, fresh=True).measures
     assert row.measures.keys() == measures.keys()
     for name, measure in measures.items():

@@ -17,16 +17,15 @@ from ...surface.compare.records import Comparison, Track
 from ...surface.profile import resample_evenly
 from ...surface.quantity import CONFIDENCE_LEVEL, HALF_WIDTH_95, Quantity
 from ...surface.spectrum import WAVE_BAND
-from ..answer import Answer, JsonObject, Remarks, Variable, Variables
+from ..answer import Answer, JsonObject, Remarks, Variables
+from ..rows import make_variables
 from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear
 from . import sentences
 from .sentences import to_answers
-from .variables import make_band, make_maps, make_variables
+from .variables import make_band, make_maps
 
 SURFACE_NAMES = ("before", "after")  # keys of the two compared surfaces or runs
-# Meanings of the codes of the variable `state`
-WEAR_STATES = ("not used", "unworn", "worn", "grown")
 # Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
 SHOWN_ELSEWHERE = (
     "worn_depth_within",
@@ -241,10 +240,10 @@ def _make_data(comparison: Comparison) -> Variables:
             curves.x, curves.y, before_map=heights[0], after_map=heights[1], depth_map=curves.depth
         )
     else:
-        data = make_variables("x", x=curves.x, before=heights[0], after=heights[1])
-        data |= make_band("x", "depth", curves.depth, HALF_WIDTH_95 * curves.noise)
-        state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3)).astype(np.int8)
-        data["state"] = Variable(("x",), state, "", "state of each height", WEAR_STATES)
+        data = make_variables("surface", x=curves.x, before=heights[0], after=heights[1])
+        data |= make_band("depth", curves.depth, HALF_WIDTH_95 * curves.noise)
+        state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3))
+        data |= make_variables("surface", state=state)
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)
 
 
@@ -253,7 +252,7 @@ def _make_tracks(tracks: tuple[Track, ...]) -> Variables:
     if not tracks:
         return {}
     ends = [track.values[name].value for track in tracks for name in ("from", "to")]
-    return make_variables("track_end", track_end=np.array(ends, float))
+    return make_variables("surface", track_end=ends)
 
 
 def _make_separate(comparison: Comparison) -> Variables:
@@ -263,7 +262,7 @@ def _make_separate(comparison: Comparison) -> Variables:
     data = {}
     traces = [level(resample_evenly(each)) for each in (comparison.before, comparison.after)]
     for side, trace in zip(SURFACE_NAMES, traces, strict=True):
-        data |= make_variables(f"x_{side}", **{f"x_{side}": trace.x, f"trace_{side}": trace.z})
+        data |= make_variables("surface", **{f"x_{side}": trace.x, f"trace_{side}": trace.z})
     return data | _make_abbott([trace.z for trace in traces])
 
 
@@ -274,8 +273,8 @@ def _make_abbott(heights) -> Variables:
         return {}
     curves = [np.quantile(values, 1 - MATERIAL_RATIOS) for values in known]
     return make_variables(
-        "material_ratio",
-        material_ratio=(MATERIAL_RATIOS, "1"),
+        "surface",
+        material_ratio=MATERIAL_RATIOS,
         abbott_before=curves[0],
         abbott_after=curves[1],
     )
@@ -286,8 +285,8 @@ def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
     pressed = runs.as_dict()
     data = dict(answer.data)
     for side, (places, stress) in runs.pressures().items():
-        x = f"x_pressed_{side}"
-        data |= make_variables(x, **{x: places, f"pressure_{side}": (stress, "Pa")})
+        columns = {f"x_pressed_{side}": places, f"pressure_{side}": stress}
+        data |= make_variables("surface", **columns)
     warnings = (*answer.remarks.warnings, *runs.failed, *pressed["warnings"])
     return replace(
         answer,

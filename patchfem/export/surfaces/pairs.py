@@ -8,12 +8,11 @@ from ...campaigns import surface_pairs
 from ...campaigns.surface_pairs import TableLine
 from ...core import PatchfemError
 from ...surface.compare.compare import COMPARE_DEFAULTS, Options
-from ..answer import Answer, JsonObject, Variables, make_columns
+from ..answer import Answer, JsonObject, Variables
+from ..rows import make_variables
 from . import compare, worn
-from .variables import VARIABLE_TEXTS
 
-# Quantities of the charts and their units
-CHARTED_QUANTITIES = {"worn_depth_mean": "m", "amplitude_ratio": "1"}
+CHARTED_QUANTITIES = ("worn_depth_mean", "amplitude_ratio")  # quantities of the charts
 
 
 def answer_pairs(
@@ -96,8 +95,8 @@ def _count_pairs(rows: list[JsonObject]) -> str:
 
 def _make_data(rows: list[JsonObject]) -> Variables:
     """Return the quantities of the charts with their intervals over the line of each pair."""
-    columns = {"line": ([float(row["line"]) for row in rows], "1", VARIABLE_TEXTS["line"])}
-    for name, unit in CHARTED_QUANTITIES.items():
+    columns = {"line": [float(row["line"]) for row in rows]}
+    for name in CHARTED_QUANTITIES:
         for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
-            columns[name + suffix] = ([row.get(name, {}).get(key) for row in rows], unit)
-    return make_columns("pair", columns)
+            columns[name + suffix] = [row.get(name, {}).get(key) for row in rows]
+    return make_variables("surface", **columns)

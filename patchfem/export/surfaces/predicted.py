@@ -13,9 +13,10 @@ from ...surface.quantity import HALF_WIDTH_95
 from ...wear import predicted
 from ...wear.predicted import MeasuredDepth, PredictedWear, WearHistory
 from ..answer import Answer, Quantity, Remarks
+from ..rows import make_variables
 from . import sentences
 from .patches import read_patch, worn_depths
-from .variables import make_band, make_variables
+from .variables import make_band
 
 # Smallest relative difference of the proportional coefficient that is reported.
 MIN_COEFFICIENT_DIFFERENCE = 0.01
@@ -80,12 +81,12 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     # Both depths along the patch, with the 95 % band of the measured one, for the chart.
     depths = fitted.depths
     data = make_variables(
-        "x_patch",
+        "surface",
         x_patch=depths.x,
         computed_depth=depths.computed,
         depth_difference=depths.measured - depths.computed,
     )
-    data |= make_band("x_patch", "measured_depth", depths.measured, HALF_WIDTH_95 * depths.noise)
+    data |= make_band("measured_depth", depths.measured, HALF_WIDTH_95 * depths.noise)
     return replace(
         answer,
         verdict=(*answer.verdict[:kept], sentence),

@@ -14,10 +14,11 @@ from ...surface.roughness import peaks, report
 from ...surface.roughness.parameters import abbott_curve
 from ...surface.roughness.report import RoughnessReport
 from ...surface.spectrum import WAVE_BAND
-from ..answer import Answer, JsonObject, Remarks, Variable, Variables
+from ..answer import Answer, JsonObject, Remarks, Variables
 from ..quantities import format_value
+from ..rows import make_variables
 from . import sentences
-from .variables import make_maps, make_variables
+from .variables import make_maps
 
 ROUGHNESS_INPUT_WORDS = {"profile": "traces", "areal": "scans"}
 # Probability of the interval of a parameter of a single trace, from 5 to 95 %
@@ -245,11 +246,13 @@ def _find_moments(roughness: RoughnessReport) -> dict | None:
 
 def _make_data(reports: list[RoughnessReport]) -> Variables:
     """Return the Abbott curves of all files, and the profiles, map and spectrum of a single file."""
-    data = make_variables("file", file=(np.array([report.source for report in reports]), ""))
     curves = [abbott_curve(report.heights) for report in reports]
-    data |= make_variables("material_ratio", material_ratio=(curves[0][0], "1"))
-    heights = np.array([height for _, height in curves])
-    data["abbott"] = Variable(("file", "material_ratio"), heights, "m", "height")
+    data = make_variables(
+        "surface",
+        file=[report.source for report in reports],
+        material_ratio=curves[0][0],
+        abbott=[height for _, height in curves],
+    )
     # Only Abbott curves can be compared over files.
     if len(reports) > 1:
         return data
@@ -257,12 +260,11 @@ def _make_data(reports: list[RoughnessReport]) -> Variables:
     surface = reports[0].surface
     if reports[0].kind == "areal":
         return data | make_maps(surface.x, surface.y, height_map=surface.z)
-    data |= make_variables("x", x=surface.primary.x, primary=surface.primary.z)
+    data |= make_variables("surface", x=surface.primary.x, primary=surface.primary.z)
     if surface.roughness is not None:
         rough = surface.roughness
         data |= make_variables(
-            "x_rough", x_rough=rough.x, roughness=rough.z, waviness=surface.waviness.z
+            "surface", x_rough=rough.x, roughness=rough.z, waviness=surface.waviness.z
         )
     spectrum = surface.spectrum
-    density = (spectrum.density, "m3")
-    return data | make_variables("wavelength", wavelength=spectrum.waves, density=density)
+    return data | make_variables("surface", wavelength=spectrum.waves, density=spectrum.density)

@@ -10,11 +10,12 @@ from ...wear import between_runs
 from ...wear.between_runs import Wear
 from .. import quantities
 from ..answer import Answer, Quantity, Variables
+from ..rows import make_variables
 from . import sentences
 from .compare import SURFACE_NAMES, build_answer
 from .patches import PatchRun, read_patch
 from .sentences import format_value
-from .variables import make_maps, make_variables
+from .variables import make_maps
 
 # measures of both runs that stand beside each other; the first three are in the verdict
 BEFORE_AND_AFTER_MEASURES = (
@@ -178,22 +179,27 @@ def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Variables:
         data = make_maps(state.x, state.y, before_map=before, after_map=after, depth_map=wear.depth)
     else:
         line = np.interp(state.x, state.x[[0, -1]], wear.hidden)
-        data = make_variables("x", x=state.x, gap_before=before, gap_after=after)
-        data |= make_variables("x", depth=wear.depth, hidden_depth=line)
+        data = make_variables(
+            "surface",
+            x=state.x,
+            gap_before=before,
+            gap_after=after,
+            depth=wear.depth,
+            hidden_depth=line,
+        )
 
     if wear.track:
-        ends = np.array([wear.track[name].value for name in ("from", "to")])
-        data |= make_variables("track_end", track_end=ends)
+        ends = [wear.track[name].value for name in ("from", "to")]
+        data |= make_variables("surface", track_end=ends)
 
     # Pressure of the last frame, on a face that at y = 0, and the loop of a single interface.
     for side, run in zip(SURFACE_NAMES, runs, strict=True):
-        variables, x = run.answer.data, f"x_pressed_{side}"
+        variables = run.answer.data
         last = np.atleast_2d(variables["normal_stress"].values[-1])
         middle = last[(len(last) - 1) // 2 : len(last) // 2 + 1].mean(axis=0)
-        pressure = (middle, "Pa")
-        data |= make_variables(x, **{x: run.state.x, f"pressure_{side}": pressure})
+        columns = {f"x_pressed_{side}": run.state.x, f"pressure_{side}": middle}
         if "loop_slide" in variables and variables["loop_slide"].values.ndim == 1:
-            force = (variables["loop_friction_force"].values, "N")
-            loop = {f"slide_{side}": variables["loop_slide"].values, f"force_{side}": force}
-            data |= make_variables(f"sample_{side}", **loop)
+            columns[f"slide_{side}"] = variables["loop_slide"].values
+            columns[f"force_{side}"] = variables["loop_friction_force"].values
+        data |= make_variables("surface", **columns)
     return data

@@ -143,7 +143,7 @@ def test_exact_curves_are_in_csv_and_netcdf():
     assert ends == pytest.approx([1.5e-3, 2.5e-3], abs=5e-6)
     band = float((data.depth_high - data.depth).mean())
     assert band == pytest.approx(1.96 * curves.noise.mean(), rel=1e-3)
-    worn = data.state.values == compare.WEAR_STATES.index("worn")
+    worn = data.state.values == data.state.flag_meanings.split().index("worn")
     assert (worn == curves.worn).all()
     # a fifth of the heights lie below the material ratio of 80 %
     for side, heights in (("before", curves.before), ("after", curves.after)):
