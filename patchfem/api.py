@@ -48,14 +48,13 @@ from .export.charts import axes as chart_axes
 from .export.fields import grids
 from .export.folder import Folder
 from .export.surfaces import compare as compared
-from .export.surfaces import pairs as compared_pairs
 from .export.surfaces import roughness, worn
 from .export.sweeps import dataset as sweep_datasets
 from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
 from .model.model import Model, build_without_sweep
 from .model.model import build as build_model
-from .runs.batch import batches, meshes
+from .runs.batch import batches
 from .runs.patch import result as patch_result
 from .runs.plan import Plan
 from .runs.plan import plan as plan_model
@@ -749,8 +748,7 @@ def run_many(
 ) -> CaseResults:
     """Run several scenes or models, and return their measures as arrays with one element per model.
 
-    Similar models are computed together in batches, with the same results as single runs. Patches of equal geometry on
-    benches have a common mesh, as in a sweep.
+    Similar models are computed together in batches, with the same results as single runs.
 
     Parameters
     ----------
@@ -780,8 +778,7 @@ def run_many(
     if isinstance(models, str | Path | Scene | Model | Mapping) or not isinstance(models, Iterable):
         models = [models]
     return batches.solve_models(
-        meshes.with_shared_meshes([build(model) for model in models]),
-        report=_print_to_stderr if say is None else say,
+        [build(model) for model in models], report=_print_to_stderr if say is None else say
     )
 
 
@@ -1251,7 +1248,7 @@ def compare(
             raise PatchfemError(
                 "compare: give the table of pairs alone, without files or predicted"
             )
-        return compared_pairs.answer_pairs(_require_path(pairs, "compare: pairs"), options).details
+        return compared.answer_pairs(_require_path(pairs, "compare: pairs"), options).details
     if len(files) == 4:
         raise PatchfemError(describe_removed("compare of four files"))
     if len(files) != 2:

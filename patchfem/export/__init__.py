@@ -7,7 +7,7 @@ In: results of `runs` and `campaigns`. Out: an `Answer`, files, and lines of tex
     Answer -> store (netcdf, columns) -> summary.json, NAME.json, result.nc, NAME.csv
     these files -> store -> page (charts: panels -> plotly) -> report.html
     Answer -> charts: panels -> axes -> --plot and `plot` in Python
-    Result -> fields: blocks -> vtkhdf -> fields.vtkhdf -> film of the page, pieces (view), grids (export)
+    Result -> fields: vtkhdf -> fields.vtkhdf -> film of the page, pieces (view), grids (export)
 
 A module imports only entries of this list that come before it:
 

@@ -90,7 +90,7 @@ class Variable:
     unit : str
         SI unit; "1" for a ratio, "" for strings and codes.
     text : str
-        Description; `long_name` in the netCDF file.
+        Description; `description` in the netCDF file.
     meanings : tuple of str
         Names of the codes 0, 1, ... for a variable that contains codes.
     """
@@ -177,7 +177,7 @@ def encode_texts(dimension: str, texts: list[str], description: str = "") -> Var
     texts : list of str
         Text of each element; a code stands for each different one.
     description : str, optional
-        What the codes are; `long_name` in the netCDF file.
+        What the codes are; `description` in the netCDF file.
     """
     meanings, codes = np.unique(np.asarray(texts, str), return_inverse=True)
     # the smallest signed type that has all codes

@@ -133,6 +133,8 @@ VARIABLES: dict[str, dict[str, Row]] = {
     for group, rows in _TABLES["variables"].items()
 }
 QUANTITIES = {name: Definition(*row) for name, row in _TABLES["quantities"].items()}
+# words of the measures in the headline of a run, by its kind
+HEADLINES: dict[str, dict[str, str]] = _TABLES["headlines"]
 CHARTS: dict[str, tuple[Chart, ...]] = _repeat_for_runs(
     {kind: tuple(Chart(**row) for row in rows) for kind, rows in _TABLES["charts"].items()}
 )

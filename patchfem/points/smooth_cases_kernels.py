@@ -231,7 +231,10 @@ def find_longest_step(first, tangent, body):
     if law != Law.TANH:
         dt = grade / sqrt(mobility * tangent + case[Number.STIFFNESS] + case[Number.OMEGA] ** 2)
         if law != Law.LUGRE:
-            return dt
+            # The force of a law of the path changes by a part of its range, which is twice the limit.
+            path = 2 * grade * numbers[LawNumber.LIMIT] / tangent
+            root = sqrt(first.velocity**2 + 2 * path * abs(first.acceleration))
+            return min(dt, 2 * path / (abs(first.velocity) + root))
         speed = numbers[LuGreNumber.SPEED]
     else:
         # The velocity relaxes at this rate to the one that the drive keeps up.

@@ -17,8 +17,8 @@ from ...surface.spectrum import WAVE_BAND
 from ..answer import Answer, JsonObject, Remarks, Variables
 from ..quantities import format_value
 from ..rows import make_variables
-from . import sentences
-from .variables import make_maps
+from . import shared
+from .shared import make_maps
 
 ROUGHNESS_INPUT_WORDS = {"profile": "traces", "areal": "scans"}
 # Probability of the interval of a parameter of a single trace, from 5 to 95 %
@@ -95,7 +95,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
             values = {key: mean.mean for key, mean in averages.items()}
             state = f"Mean of {len(members)} {name}: "
         headlines.append(f"{state}{_format_main_parameters(values, members)}.")
-        quantities |= sentences.to_answers(values)
+        quantities |= shared.to_answers(values)
 
     # A treatment that several surfaces share is named once, after the headlines.
     notes = [text for report in reports for text in report.notes]
@@ -106,7 +106,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
     return Answer(
         kind="profile",
         title="Roughness of " + ", ".join(Path(report.source).name for report in reports),
-        verdict=(*headlines, *treatments)[: sentences.MAX_VERDICT_SENTENCES],
+        verdict=(*headlines, *treatments)[: shared.MAX_VERDICT_SENTENCES],
         quantities=quantities,
         data=_make_data(reports),
         remarks=Remarks(tuple(cautions), (*notes, *([MEANS_NOTE] if means else []))),
@@ -165,7 +165,7 @@ def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[st
     """
     measures = {}
     for name, mean in means.items():
-        measures[name] = sentences.to_answer(mean.mean).as_json() | {"scatter": mean.scatter}
+        measures[name] = shared.to_answer(mean.mean).as_json() | {"scatter": mean.scatter}
     content = {"kind": kind, "files": count, "confidence": CONFIDENCE_LEVEL, "notes": notes}
     return content | {"measures": measures}
 
@@ -175,9 +175,9 @@ def _format_main_parameters(values: dict[str, Quantity], members: list[Roughness
     parts = []
     names = next(names for names in HEADLINE_PARAMETERS if names[0] in values)
     for name in names:
-        if not sentences.is_known(values.get(name)):
+        if not shared.is_known(values.get(name)):
             continue
-        text = f"{name} {sentences.format_value(name, values[name])}"
+        text = f"{name} {shared.format_value(name, values[name])}"
         if values[name].reason == "few_files":
             mean_values = [each[name].value for each in members]
             ends = [format_value(end, "m", 3) for end in (min(mean_values), max(mean_values))]
@@ -224,7 +224,7 @@ def report_to_dict(roughness: RoughnessReport) -> JsonObject:
         "form": treatment.form,
         "s_filter": treatment.short,
         "confidence": TRACE_INTERVAL_PROBABILITY if has_interval else None,
-        "measures": sentences.to_answers({value.name: value for value in roughness.values}),
+        "measures": shared.to_answers({value.name: value for value in roughness.values}),
         "notes": roughness.notes,
     }
     if roughness.kind == "areal":
