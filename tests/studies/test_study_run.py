@@ -20,7 +20,7 @@ def test_always_studies_are_run_with_options():
         for path, text in programs.items()
         if not re.search(r'__main__":\n    run_study\(', text)
     ]
-    assert len(programs) > 40 and others == ["jobqueue.py", "speed.py"]
+    assert len(programs) > 40 and others == ["jobqueue.py", "killed.py", "speed.py"]
 
 
 def test_always_study_writes_only_below_out(tmp_path):
