@@ -18,12 +18,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import HealthCheck, settings
 
-from patchfem.compiled import UNCACHED_FUNCTIONS, cache_folder
+from patchfem.compiled import UNCACHED_FUNCTIONS, find_cache_folder
 
 HERE = Path(__file__).parent
 
-# Numba would run the old code of an edited kernel if its folder did not depend on the sources.
-os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
+CACHE_FOLDER = find_cache_folder().path
 
 # Folders whose tests compile code run first, folders that use this code again run last, all others in between.
 COMPILING = ("dynamics", "export", "model", "campaigns", "response", "runs", "commands", "friction")
@@ -32,14 +31,14 @@ LATER = ("structure", "wear", "scene", "identify", "torture", "studies")
 if sys.dont_write_bytecode:
     # Otherwise each of hundreds of child processes translates all modules that it imports.
     sys.dont_write_bytecode = False
-    sys.pycache_prefix = str(cache_folder() / "bytecode")
+    sys.pycache_prefix = str(CACHE_FOLDER / "bytecode")
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 def list_compiled_functions() -> set:
     """Return the paths of the compiled functions in the cache."""
-    return set((cache_folder() / "code").glob("*.code"))
+    return set((CACHE_FOLDER / "code").glob("*.code"))
 
 
 COMPILED_BEFORE = list_compiled_functions()
@@ -118,7 +117,7 @@ def pytest_terminal_summary(terminalreporter):
     new = len(list_compiled_functions() - COMPILED_BEFORE)
     terminalreporter.write_line(
         f"{len(COMPILED_BEFORE)} compiled functions were kept, {new} more are now, in "
-        f"{cache_folder()}"
+        f"{CACHE_FOLDER}"
     )
 
 

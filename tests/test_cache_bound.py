@@ -1,4 +1,4 @@
-"""Removal of compiled code of old kernels: the least recently used first, never code used in the last day."""
+"""Removal of compiled code of old kernels, which was not used for a month."""
 
 import os
 from pathlib import Path
@@ -28,14 +28,16 @@ def make_current_folder(base: Path) -> Path:
     return folder
 
 
-def test_exact_least_recently_used_folders_are_removed(tmp_path):
-    """The folders unused for longest are removed down to the limit, except for those used in the last day."""
-    folders = make_code_folders(tmp_path, [300, 25, 500, 0.5, 30, 0.1, 400, 23])
+def test_exact_unused_folders_are_removed(tmp_path):
+    """A new folder removes those that were unused for longer than the limit; a folder in use is marked."""
+    days = compiled.MAX_UNUSED_SECONDS / HOUR
+    folders = make_code_folders(tmp_path, [days + 1, days - 1, 0.0, 9 * days])
+    compiled.remove_old_folders(folders[1])  # it contains code
+    assert all(folder.exists() for folder in folders)
+    assert time() - folders[1].stat().st_mtime < 60
     current = make_current_folder(tmp_path)
-    compiled.remove_old_folders(current, 4)
-    assert [k for k in range(8) if folders[k].exists()] == [1, 3, 5, 7]
-    compiled.remove_old_folders(current, 0)
-    assert [k for k in range(8) if folders[k].exists()] == [3, 5, 7]
+    compiled.remove_old_folders(current)
+    assert [folder.exists() for folder in folders] == [False, True, True, False]
     assert current.is_dir()
 
 
@@ -49,19 +51,6 @@ def test_exact_other_files_are_not_removed(tmp_path):
     target.mkdir()
     (tmp_path / ("2" * 16)).symlink_to(target)
     for path in tmp_path.iterdir():
-        os.utime(path, (time() - 99 * HOUR,) * 2, follow_symlinks=False)
-    compiled.remove_old_folders(current, 0)
+        os.utime(path, (time() - 9999 * HOUR,) * 2, follow_symlinks=False)
+    compiled.remove_old_folders(current)
     assert target.is_dir() and len(list(tmp_path.iterdir())) == 7
-
-
-def test_exact_only_new_folder_removes_old_ones(tmp_path):
-    """A new folder removes the oldest folders beyond the limit, and each use updates the time of a folder."""
-    folders = make_code_folders(
-        tmp_path, [30 + k for k in range(compiled.MAX_OTHER_CACHE_FOLDERS + 3)]
-    )
-    compiled.remove_old_folders(folders[0])  # it contains code
-    assert all(folder.exists() for folder in folders)
-    assert time() - folders[0].stat().st_mtime < 60
-    compiled.remove_old_folders(make_current_folder(tmp_path))
-    kept = [folder.exists() for folder in folders]
-    assert kept == [True] * compiled.MAX_OTHER_CACHE_FOLDERS + [False] * 3

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numba import njit
 from scene_texts import PLASTIC, POINT, STRUCTURE
 
 import patchfem as pf
@@ -40,14 +39,14 @@ class Column(IntEnum):
 
 
 def weighted_sum(first, outer, step, out):
-    """Write weighted sums that call the C library into `out`; return a count and a nested tuple."""
+    """Write weighted sums that call the C library into `out`; return a count and a total."""
     total = 0.0
     for i in range(outer.count):
         total += exp(-outer.inner.places[i] * outer.inner.scale) * tan(outer.first[i])
         for j in range(outer.grid.shape[1]):
             total += outer.grid[i, j] * step
         out[i] = total
-    return outer.count + first, (total, outer.inner.places.size)
+    return outer.count + first, total
 
 
 def fill(out, value):
@@ -76,21 +75,20 @@ def make_arguments():
 
 
 def store_code(path, function, arguments) -> bool:
-    """Compile a function of numba into a file, and return whether it can be stored."""
+    """Compile a function into a file, and return whether it can be stored."""
     return machine.compile_function(path, function, arguments, jit.compile_unoptimised) is not None
 
 
 def compile_and_reload(path, function, *arguments):
     """Return the result of numba, and the function read back from its file or None."""
-    made = njit(error_model="numpy", _nrt=function is allocated_size)(function)
+    made = jit.njit(error_model="numpy", _nrt=function is allocated_size)(function)
     answer = made(*arguments)
     return answer, machine.load_file(path) if store_code(path, made, arguments) else None
 
 
 def pack_arguments(*arguments) -> bytes:
     """Return the arguments as the machine words of a call."""
-    words = machine.ArgumentConverter()
-    return b"".join(words.convert(one)[1] for one in arguments)
+    return b"".join(machine.convert_argument(one)[1] for one in arguments)
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +96,7 @@ def stored_sum(tmp_path_factory):
     """Return path, arguments, result and both versions of the stored function `weighted_sum`."""
     path = tmp_path_factory.mktemp("code") / "weighed.code"
     given = make_arguments()
-    made = njit(error_model="numpy", _nrt=False)(weighted_sum)
+    made = jit.njit(error_model="numpy", _nrt=False)(weighted_sum)
     answer = made(*given)
     assert store_code(path, made, given)
     return path, given, answer, machine.load_file(path), made
@@ -108,16 +106,16 @@ def test_exact_stored_code_gives_same_bits(stored_sum):
     """The function read from its file returns the same bits as numba's, also for other arguments."""
     _, (first, outer, step, out), answer, code, numba_sum = stored_sum
     result = np.zeros(5)
-    assert code(pack_arguments(first, outer, step, result)) == answer == (8, (answer[1][0], 7))
-    assert np.array_equal(result, out) and answer[1][0] == out[-1] != 0
+    assert code(pack_arguments(first, outer, step, result)) == answer == (8, out[-1])
+    assert np.array_equal(result, out) and out[-1] != 0
     # arguments other than those of the first call
     other = outer._replace(count=2, inner=Inner(-outer.inner.places, 1.5))
     assert (
         code(pack_arguments(-1, other, 2.0, result))
         == numba_sum(-1, other, 2.0, np.zeros(5))
-        == (1, (result[1], 7))
+        == (1, result[1])
     )
-    assert result[1] == pytest.approx(weighted_sum(-1, other, 2.0, out)[1][0], rel=1e-13)
+    assert result[1] == pytest.approx(weighted_sum(-1, other, 2.0, out)[1], rel=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -128,15 +126,13 @@ def test_exact_stored_code_gives_same_bits(stored_sum):
         lambda text: b"",
         lambda text: b"{}\n" + text,
         lambda text: text[:-9] + bytes([text[-9] ^ 1]) + text[-8:],
-        lambda text: text.replace(b'"tan"', b'"tam"'),
-        lambda text: text.replace(b'"tan"', b'"PyErr_Clear"'),
+        lambda text: text.replace(b'"name"', b'"game"'),
     ],
-    ids=["cut", "cut early", "empty", "no head", "one bit", "no such function", "Python's"],
+    ids=["cut", "cut early", "empty", "no head", "one bit", "no name"],
 )
 def test_refuses_damaged_code_file(stored_sum, tmp_path, damage):
     """A damaged or missing code file is not loaded."""
     text = stored_sum[0].read_bytes()
-    assert json.loads(text.partition(b"\n")[0])["calls"] == ["tan"]
     (tmp_path / "a.code").write_bytes(damage(text))
     assert machine.load_file(tmp_path / "a.code") is None
     assert machine.load_file(tmp_path / "none.code") is None
@@ -145,7 +141,7 @@ def test_refuses_damaged_code_file(stored_sum, tmp_path, damage):
 @pytest.mark.parametrize("text", [b"", b"define void @a() { of a later version }", b"\xff"])
 def test_refuses_portable_code_that_llvm_cannot_read(tmp_path, text):
     """Portable code without a header, or in a language that this version of LLVM does not know, is not loaded."""
-    header = {"name": "a", "results": "", "nogil": False, "is_vectorised": False}
+    header = {"name": "a", "results": "", "is_tuple": False, "is_vectorised": False}
     assert machine.compile_for_this_cpu(tmp_path / "a.code", text) is None
     if text:
         portable = machine.join_file(header, text)
@@ -173,21 +169,20 @@ def test_refuses_code_that_needs_numba(tmp_path):
     )  # the function allocates memory
     for unsupported in (True, "text", 1j, [1.0], None, np.float32(1), (1.0, None)):
         with pytest.raises(machine.UnsupportedError):
-            machine.ArgumentConverter().convert(unsupported)
+            machine.convert_argument(unsupported)
     assert not list(tmp_path.iterdir())
     # The folder does not exist, but the function is compiled and loaded.
-    assert store_code(tmp_path / "none/folder/a.code", njit(double_positive), (1.0,))
+    assert store_code(tmp_path / "none/folder/a.code", jit.njit()(double_positive), (1.0,))
     assert not list(tmp_path.iterdir())
 
 
 def test_always_argument_kinds_distinguish_types():
     """Arguments that differ in type, layout, precision or writability have different kinds."""
-    words = machine.ArgumentConverter()
     grid = np.zeros((4, 4))
     read_only = np.zeros(4)
     read_only.flags.writeable = False
     kinds = [
-        words.convert(one)[0]
+        machine.convert_argument(one)[0]
         for one in (
             1.0,
             1,
@@ -203,10 +198,9 @@ def test_always_argument_kinds_distinguish_types():
             (),
         )
     ]
-    assert kinds[3] == "<f82C"[:-1] + "F" and len(set(kinds)) == len(kinds)
-    assert words.convert(np.float64(1.0)) == words.convert(1.0) and words.convert(
-        np.int64(7)
-    ) == words.convert(7)
+    assert len(set(kinds)) == len(kinds)
+    for number, other in ((np.float64(1.0), 1.0), (np.int64(7), 7)):
+        assert machine.convert_argument(number) == machine.convert_argument(other)
 
 
 MEASURES = ("slip_amplitude", "friction_work")
@@ -249,6 +243,6 @@ def test_exact_integer_enum_members_are_integers_in_kernels():
     Numba alone rejects both.
     """
     compiled_table, table = np.zeros((2, 2, 2))
-    result = jit.njit(cache=False)(sum_with_enum_indices).get_standalone()(compiled_table)
+    result = jit.njit()(sum_with_enum_indices)(compiled_table)
     assert result == sum_with_enum_indices(table) == 1.5
     np.testing.assert_array_equal(compiled_table, table)

@@ -91,8 +91,7 @@ def _find_version(name: str) -> str:
 
 def _check_cache() -> Finding:
     """Check the cache of compiled code, without which every command would compile again."""
-    folder = compiled.cache_folder()
-    reason = compiled.explain_cache_folder()
+    folder, reason = compiled.find_cache_folder()
     sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
     text = f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}"
     cure = reason and f"{reason}; set PATCHFEM_CACHE to another folder"

@@ -4,12 +4,11 @@
 which some imports are replaced. The module, and with it numba, is imported only if a function is called whose machine
 code is not stored.
 `jit` contains the decorator `njit` of all kernels, `machine` compiles, stores and loads machine code, `portable` has code
-that needs no numba. Where `machine` cannot store a function, numba stores it in the same folder. Read
+that needs no numba. Where `machine` cannot store a function, numba compiles it in every process. Read
 `load_compiled_module`, `instantiate` and `KernelFunction` first.
 
-The cache of numba detects a change of the file of a function, but not of the modules whose functions it calls, and it
-stores no function that takes another function as an argument. So the folder is named by a hash of all kernel sources,
-and a loop for any friction law is written out once per law by `instantiate`, with the import of the law replaced.
+The folder is named by a hash of all kernel sources, since the code of a function contains that of the functions which it
+calls. A loop for any friction law is written out once per law by `instantiate`, with the import of the law replaced.
 
 NUMBA_DISABLE_JIT=1 runs every kernel as Python for debuggers and coverage tools. NUMBA_BOUNDSCHECK=1 compiles all
 kernels again with checks of every index.
@@ -27,12 +26,13 @@ import re
 import shutil
 import sys
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location, spec_from_loader
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
 from threading import RLock
 from time import monotonic, process_time, sleep, time
+from typing import NamedTuple
 
 from .. import cost_model
 from ..disk import user_cache
@@ -43,15 +43,7 @@ from .portable import read_portable_codes
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "flags_kernels": (
-        "FASTMATH_FLAGS",
-        "NJIT_CALL",
-        "NJIT_KERNEL",
-    ),
-    "jit": (
-        "NJIT_NO_REFCOUNT",
-        "njit",
-    ),
+    "jit": ("njit",),
 }
 
 PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
@@ -64,13 +56,11 @@ TUPLE_MODULES = (
     "points/law_rows.py",
 )
 CACHE_FOLDER_PATTERN = re.compile(r"[0-9a-f]{16}")
-# Largest number of folders of compiled code, 0.5 MB to 20 MB each, besides the one in use. Every edit of a kernel, every
-# release and every kind of CPU makes another one; several may share a home folder.
-MAX_OTHER_CACHE_FOLDERS = 8
-# Smallest time [s] since the last start of a process with a folder that is removed: a day.
-MIN_UNUSED_SECONDS = 86400.0
-# State of the environment variable that makes numba run all kernels as Python.
-IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+# Time [s] since the last start of a process with a folder of compiled code after which it is removed: 30 days. Every edit of
+# a kernel, every release and every kind of CPU makes a folder of 1 to 5 MB; several may share a home folder.
+MAX_UNUSED_SECONDS = 30 * 86400.0
+# Whether machine code is stored: on POSIX systems, unless an environment variable makes numba run all kernels as Python.
+STORES_CODE = os.name == "posix" and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 # Time to wait for another process that compiles [s]: ten times the longest compilation.
 MAX_LOCK_WAIT_SECONDS = 300.0
 # Time between two attempts to take the lock [s], short compared with a compilation.
@@ -81,8 +71,6 @@ UNCACHED_FUNCTIONS = set()
 # Lock that lets one thread at a time load code, because loading a function twice at the
 # same time crashes the process.
 CODE_LOADING_LOCK = RLock()
-# Converter of the arguments of all functions, because several functions get the same tuples in turn.
-CONVERTER = machine.ArgumentConverter()
 REPORT = [None]  # callback of the last run, which receives a message if numba compiles a function
 
 
@@ -120,39 +108,36 @@ def _describe_cpu() -> str:
     return " ".join(descriptions) or platform.processor()
 
 
-def cache_folder() -> Path:
+class CacheFolder(NamedTuple):
+    """Folder of compiled code, and the reason why it is not in the user's cache; "" if it is."""
+
+    path: Path
+    problem: str
+
+
+def find_cache_folder() -> CacheFolder:
     """Return the folder of compiled code for this state of the kernels.
 
-    It lies in the user's cache. If that belongs to another user or cannot be written, it lies in the folder of the
-    session (XDG_RUNTIME_DIR), or else in a folder of this process alone.
+    It lies in the user's cache. If that belongs to another user or cannot be written, it is a folder of this process.
     """
-    return _choose_folder()[0]
-
-
-def explain_cache_folder() -> str:
-    """Return the reason why `cache_folder` is not in the user's cache; "" if it is."""
-    return _choose_folder()[1]
+    name = Path("patchfem") / compute_kernel_key()
+    folder = user_cache.find_cache_base() / name
+    problem = user_cache.prepare_folder(folder)
+    if problem:
+        folder = user_cache.make_process_folder() / name
+        user_cache.prepare_folder(folder)  # creates the folder if possible
+    return CacheFolder(folder, problem)
 
 
 @cache
-def _choose_folder_once() -> tuple[Path, str]:
-    """Return what `_choose_folder` returned at the first call in this process."""
-    return _choose_folder()
-
-
-def _choose_folder() -> tuple[Path, str]:
-    """Return the cache folder, and the reason why it is not in the user's cache; "" if it is."""
-    session = os.environ.get("XDG_RUNTIME_DIR")
-    name = Path("patchfem") / compute_kernel_key()
-    user_folder = user_cache.find_cache_base() / name
-    reason = user_cache.prepare_folder(user_folder)
-    if not reason:
-        return user_folder, ""
-    if session and not user_cache.prepare_folder(Path(session) / name):
-        return Path(session) / name, reason
-    process_folder = user_cache.make_process_folder() / name
-    user_cache.prepare_folder(process_folder)  # creates the folder if possible
-    return process_folder, reason
+def use_cache_folder() -> CacheFolder:
+    """Return the folder of compiled code of this process, which its child processes use too."""
+    folder = find_cache_folder()
+    if folder.problem:
+        os.environ["PATCHFEM_CACHE"] = str(folder.path.parents[1])
+    else:
+        remove_old_folders(folder.path)
+    return folder
 
 
 class KernelModule:
@@ -165,38 +150,25 @@ class KernelModule:
     ----------
     name : str
         Full name of the module.
-    source : Path or str
-        Its file, or its text if it has no file.
+    text : str
+        Its source.
     importer : callable
         Function without arguments that imports the module and returns it.
     """
 
-    def __init__(self, name: str, source: Path | str, importer):
+    def __init__(self, name: str, text: str, importer):
         self.__name__ = name
-        self._source = source
-        self._importer = importer
-        self._functions = {}
+        self.load_module = importer
+        # Whether loops may become vector instructions
+        self.is_vectorised = "\nIS_VECTORISED = False" not in text
+        for function in re.findall(r"(?m)^@njit\b[^@]*?^def (\w+)", text):
+            setattr(self, function, KernelFunction(self, function))
 
     def __getattr__(self, name: str):
-        """Return a KernelFunction of the module, which is imported for other names."""
+        """Return an attribute, by its name, of the module, which is imported."""
         if name.startswith("__"):
             raise AttributeError(f"{self.__name__} has no {name}")
-        if name not in self._functions:
-            if name not in _list_functions(self._source):
-                return getattr(self.load_module(), name)
-            file_prefix = f"{self.__name__.removeprefix('patchfem.')}.{name}-"
-            self._functions[name] = KernelFunction(self, name, file_prefix)
-        return self._functions[name]
-
-    @property
-    def is_vectorised(self) -> bool:
-        """Whether loops of the module may become vector instructions; its constant IS_VECTORISED, by default True."""
-        return "\nIS_VECTORISED = False" not in _read_text(self._source)
-
-    def load_module(self):
-        """Import the module and return it."""
-        _prepare_cache()
-        return self._importer()
+        return getattr(self.load_module(), name)
 
 
 # Time [s] in which this process compiled code or waited for another process that did.
@@ -261,66 +233,44 @@ class KernelFunction:
         Module of the function.
     name : str
         Name of the function in the module.
-    file_prefix : str
-        Start of the names of its files of machine code; a hash of the argument types follows.
     """
 
-    def __init__(self, module: KernelModule, name: str, file_prefix: str):
+    def __init__(self, module: KernelModule, name: str):
         self.module = module
         self.name = name
-        self.file_prefix = file_prefix
         # Loaded function for each tuple of type codes; False if numba runs the function itself.
         self.loaded_functions = {}
 
     def __call__(self, *arguments):
-        if IS_JIT_DISABLED:
+        if not STORES_CODE:
             return self.get_dispatcher()(*arguments)
-        try:
-            type_codes, words = zip(*map(CONVERTER.convert, arguments))
-        except machine.UnsupportedError:
-            UNCACHED_FUNCTIONS.add(self.file_prefix[:-1])
-            return self.get_dispatcher()(*arguments)
+        type_codes, words = zip(*map(machine.convert_argument, arguments))
         function = self.loaded_functions.get(type_codes)
         if function is None:
             with CODE_LOADING_LOCK:
                 # Another thread may have loaded it in the meantime.
                 function = self.loaded_functions.get(type_codes)
                 if function is None:
-                    return self._call_first_time(type_codes, words, arguments)
+                    function = self._load_machine_code(type_codes, arguments)
+                    self.loaded_functions[type_codes] = function
         return function(b"".join(words)) if function else self.get_dispatcher()(*arguments)
 
-    def _make_file_name(self, type_codes) -> str:
-        """Return the name of the file with the code for arguments of these types."""
-        return f"{self.file_prefix}{hash_text(','.join(type_codes))}.code"
+    def _load_machine_code(self, type_codes: tuple[str, ...], arguments: tuple[object, ...]):
+        """Return the code for arguments of these types from its file, or compile it into the file.
 
-    def _call_first_time(
-        self, type_codes: tuple[str, ...], words: tuple[bytes, ...], arguments: tuple[object, ...]
-    ):
-        """Load or compile the code for arguments of these types, and return the result of the call.
-
-        `words` are the arguments as machine words, one entry for each.
+        Portable code of the package needs no numba. Returns False if the function cannot be compiled in this way.
         """
-        path = _prepare_cache() / "code" / self._make_file_name(type_codes)
-        function = machine.load_file(path)
-        if function is None:
-            with measure_compile_time():
-                function = self._build_machine_code(path, arguments)
-        if function is None:
-            with measure_compile_time(), pause_garbage_collection():
-                result = self.get_dispatcher()(*arguments)
-            UNCACHED_FUNCTIONS.add(self.file_prefix[:-1])
-            self.loaded_functions[type_codes] = False
-            return result
-        self.loaded_functions[type_codes] = function
-        return function(b"".join(words))
-
-    def _build_machine_code(self, path: Path, arguments: tuple[object, ...]):
-        """Compile code for arguments of these types into the file `path`, or load it from there.
-
-        It is there if another process has compiled it. Portable code of the package needs no numba. Returns None if the
-        function cannot be compiled in this way.
-        """
-        with lock_exclusively(path.with_suffix(".lock")):
+        prefix = f"{self.module.__name__.removeprefix('patchfem.')}.{self.name}"
+        folder = use_cache_folder().path / "code"
+        path = folder / f"{prefix}-{hash_text(','.join(type_codes))}.code"
+        if function := machine.load_file(path):
+            return function
+        with (
+            measure_compile_time(),
+            pause_garbage_collection(),
+            lock_exclusively(path.with_suffix(".lock")),
+        ):
+            # Another process may have compiled it in the meantime.
             function = machine.load_file(path)
             if function is None:
                 portable_code = list_portable_codes().get(path.name, b"")
@@ -328,60 +278,43 @@ class KernelFunction:
             if function is None:
                 if REPORT[0] is not None:
                     _report_compilation(REPORT[0])
-                with pause_garbage_collection():
-                    compiler = import_module(f"{__name__}.jit").compile_unoptimised  # imports numba
-                    function = machine.compile_function(
-                        path,
-                        self.get_dispatcher(),
-                        arguments,
-                        compiler,
-                        is_vectorised=self.module.is_vectorised,
-                    )
-        return function
+                compiler = import_module(f"{__name__}.jit").compile_unoptimised  # imports numba
+                function = machine.compile_function(
+                    path,
+                    self.get_dispatcher(),
+                    arguments,
+                    compiler,
+                    is_vectorised=self.module.is_vectorised,
+                )
+        if function is None:
+            UNCACHED_FUNCTIONS.add(prefix)
+        return function or False
 
     def get_dispatcher(self):
-        """Return the dispatcher of the function, which numba compiles or loads from its cache."""
-        function = getattr(self.module.load_module(), self.name)
-        return function.get_standalone() if hasattr(function, "get_standalone") else function
+        """Return the dispatcher of the function, or the function itself if numba is disabled."""
+        return getattr(self.module.load_module(), self.name)
 
 
-def _read_text(source: Path | str) -> str:
-    """Return the text of a module from its file or its text."""
-    return source.read_text("utf-8") if isinstance(source, Path) else source
+_KERNEL_MODULES = {}  # `KernelModule` by its name without that of the package
 
 
-@cache
-def _list_functions(source: Path | str) -> set[str]:
-    """Return the names of the compiled functions of a module from its source."""
-    return set(re.findall(r"(?m)^@njit\b[^@]*?^def (\w+)", _read_text(source)))
-
-
-def load_compiled_module(module: str, report=None):
-    """Load a module of the package, whose compiled code is cached on disk.
+def load_compiled_module(module: str, report=None) -> KernelModule:
+    """Return a kernel module of the package without importing it.
 
     Parameters
     ----------
     module : str
         Name of the module without that of the package, such as "time_steps.march_kernels".
     report : callable or None
-        Callback that receives a message if numba compiles a function.
-
-    Returns
-    -------
-    KernelModule or module
-        A `KernelModule` if the name ends with "kernels".
+        Callback that receives a message, once per process, if numba compiles a function.
     """
-    _prepare_cache(report)
-    if module.endswith("kernels"):
-        return get_kernel_module(module)
-    return import_module(f"patchfem.{module}")
-
-
-@cache
-def get_kernel_module(module: str) -> KernelModule:
-    """Return the kernel module of this name without importing it."""
-    name = f"patchfem.{module}"
-    return KernelModule(name, _find_source(module), lambda: import_module(name))
+    if report is not None:
+        REPORT[0] = report
+    if module not in _KERNEL_MODULES:
+        name = f"patchfem.{module}"
+        text = _find_source(module).read_text("utf-8")
+        _KERNEL_MODULES[module] = KernelModule(name, text, partial(import_module, name))
+    return _KERNEL_MODULES[module]
 
 
 def _find_source(module: str) -> Path:
@@ -389,17 +322,12 @@ def _find_source(module: str) -> Path:
     return PACKAGE_FOLDER.joinpath(*module.split(".")).with_suffix(".py")
 
 
-_KERNEL_MODULES = {}  # `KernelModule` for each name that `instantiate` has made
-
-
 def instantiate(
     module: str, replacements: dict[str, str | KernelModule], report=None
 ) -> KernelModule:
-    """Write a kernel module in which other modules replace some of its imports.
+    """Return a kernel module in which other modules replace some of its imports.
 
-    The source differs from the file in these imports only, so the line numbers of tracebacks are those of the file. It is
-    written atomically into the folder of the compiled code, under a name with the hash of its content, because several
-    processes may need it at the same time and the package may be read-only.
+    The source differs from the file in these imports only, so the line numbers of tracebacks are those of the file.
 
     Parameters
     ----------
@@ -409,7 +337,7 @@ def instantiate(
         Name under which the module imports another one (`from . import other as name`) -> the module that replaces it,
         or its name without that of the package. It must have the same functions.
     report : callable or None
-        Callback that receives a message if numba compiles a function.
+        Callback that receives a message, once per process, if numba compiles a function.
 
     Returns
     -------
@@ -420,6 +348,8 @@ def instantiate(
     ValueError
         If the module does not import another one exactly once under one of these names.
     """
+    if report is not None:
+        REPORT[0] = report
     names = []
     for alias, replacement in replacements.items():
         names.append((alias, getattr(replacement, "__name__", f"patchfem.{replacement}")))
@@ -429,7 +359,7 @@ def instantiate(
     # Each new module would load its machine code (about 1 MB) again, in every run of a long sweep.
     name = f"{module}_{hash_text(text)}"
     if name not in _KERNEL_MODULES:
-        _KERNEL_MODULES[name] = write_kernel_module(name, text, report, imported)
+        _KERNEL_MODULES[name] = make_kernel_module(name, text, _find_source(module), imported)
     return _KERNEL_MODULES[name]
 
 
@@ -454,8 +384,8 @@ def hash_text(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def write_kernel_module(module: str, text: str, report=None, imported=()) -> KernelModule:
-    """Write the source of a kernel module into the cache folder, and return the module.
+def make_kernel_module(module: str, text: str, file: Path, imported=()) -> KernelModule:
+    """Return a kernel module with a given source.
 
     Parameters
     ----------
@@ -463,35 +393,23 @@ def write_kernel_module(module: str, text: str, report=None, imported=()) -> Ker
         Name of the module without that of the package.
     text : str
         Source.
-    report : callable or None
-        Callback that receives a message if numba compiles a function.
+    file : Path
+        File that tracebacks name.
     imported : sequence of KernelModule
         Modules that the source imports; they are imported before it.
-
-    Returns
-    -------
-    KernelModule
     """
     name = f"patchfem.{module}"
-    path = _prepare_cache(report) / "instances" / f"{module}.py"
-    data = text.encode()
-    is_stored = _read_bytes(path) == data or user_cache.write_cache_file(path, data)
 
-    def import_written_module():
-        """Import the module from its file, or execute its text if the file cannot be written."""
-        if name in sys.modules:
-            return sys.modules[name]
+    @cache
+    def execute_source():
+        """Execute the source, and return the module."""
         for kernel_module in imported:
             kernel_module.load_module()
-        spec = spec_from_file_location(name, path) if is_stored else spec_from_loader(name, None)
-        sys.modules[name] = module_from_spec(spec)
-        if is_stored:
-            spec.loader.exec_module(sys.modules[name])
-        else:
-            exec(compile(text, str(path), "exec"), sys.modules[name].__dict__)
-        return sys.modules[name]
+        made = sys.modules[name] = module_from_spec(spec_from_loader(name, None))
+        exec(compile(text, str(file), "exec"), made.__dict__)
+        return made
 
-    return KernelModule(name, path if is_stored else text, import_written_module)
+    return KernelModule(name, text, execute_source)
 
 
 def list_portable_codes() -> dict[str, bytes]:
@@ -504,67 +422,31 @@ def list_portable_codes() -> dict[str, bytes]:
     return read_portable_codes(hash_kernels())
 
 
-def _read_bytes(path: Path) -> bytes | None:
-    """Return the content of the file `path`, or None if it cannot be read."""
-    try:
-        return path.read_bytes()
-    except OSError:
-        return None
-
-
-def _prepare_cache(report=None) -> Path:
-    """Set the cache folder for numba too, and return it.
-
-    The callback `report` receives a message, once per process, if numba compiles a function.
-    """
-    if report is not None:
-        REPORT[0] = report
-    return set_cache_folder()
-
-
-@cache
-def set_cache_folder() -> Path:
-    """Return the cache folder, and make numba and child processes use it."""
-    folder, reason = _choose_folder_once()
-    if reason:
-        os.environ["PATCHFEM_CACHE"] = str(folder.parents[1])  # for child processes
-    else:
-        remove_old_folders(folder)
-    os.environ["NUMBA_CACHE_DIR"] = str(folder)
-    if "numba" in sys.modules:
-        sys.modules["numba"].config.CACHE_DIR = str(folder)
-    return folder
-
-
 @cache
 def _report_compilation(report) -> None:
     """Report, once per callback, that numba compiles."""
-    reason = _choose_folder_once()[1]
+    problem = use_cache_folder().problem
     duration = "which takes 10 to 30 s and is needed only once"
-    if reason:
+    if problem:
         duration = (
-            f"which takes 10 to 30 s at every command because the compiled code cannot be kept: {reason}; set "
+            f"which takes 10 to 30 s at every command because the compiled code cannot be kept: {problem}; set "
             "PATCHFEM_CACHE to another folder"
         )
     report(f"compiling the code of the simulation for this machine, {duration}")
 
 
-def remove_old_folders(folder: Path, max_others: int = MAX_OTHER_CACHE_FOLDERS) -> None:
-    """Mark a folder of compiled code as used now; if it is new, remove the least recently used ones beside it.
+def remove_old_folders(folder: Path) -> None:
+    """Mark a folder of compiled code as used now; if it is new, remove those beside it that are no longer used.
 
-    The `max_others` most recently used ones and those used in the last day stay. A process that has used one of the
-    removed folders for longer goes on with the code that it has loaded. Folders that cannot be removed stay too.
+    A process that has used one of them for longer goes on with the code that it has loaded. Folders that cannot be
+    removed stay too.
     """
     with suppress(OSError):
         is_new = not any(folder.iterdir())
         os.utime(folder)
-        if not is_new:
-            return
-        others = {}
-        for entry in os.scandir(folder.parent):
-            is_code = CACHE_FOLDER_PATTERN.fullmatch(entry.name) and entry.name != folder.name
-            if is_code and entry.is_dir(follow_symlinks=False):
-                others[entry.path] = entry.stat().st_mtime
-        for other in sorted(others, key=others.get, reverse=True)[max_others:]:
-            if time() - others[other] > MIN_UNUSED_SECONDS:
-                shutil.rmtree(other, ignore_errors=True)
+        for entry in os.scandir(folder.parent) if is_new else ():
+            is_code = CACHE_FOLDER_PATTERN.fullmatch(entry.name)
+            if not is_code or not entry.is_dir(follow_symlinks=False):
+                continue
+            if time() - entry.stat().st_mtime > MAX_UNUSED_SECONDS:
+                shutil.rmtree(entry.path, ignore_errors=True)

@@ -1,12 +1,11 @@
 """Decorator `njit` of all kernels, which compiles helper functions only within their callers.
 
 Numba optimises every function separately, adds wrappers for calls from Python and C and emits machine code, and repeats
-most of this work in every caller: the body of a nested call is compiled about once per level of the nesting. A function
-without `cache=True` skips these steps here. Its LLVM code is linked into its callers without optimisation, and `machine`
-optimises each function that Python calls once, with all that it calls.
+most of this work in every caller: the body of a nested call is compiled about once per level of the nesting. These steps
+are skipped here. The LLVM code of a function is linked into its callers without optimisation, and `machine` optimises each
+function that Python calls once, with all that it calls.
 """
 
-from contextlib import suppress
 from types import SimpleNamespace
 
 import numba
@@ -17,7 +16,6 @@ from numba.core.compiler import Compiler, CompileResult
 from numba.core.compiler_machinery import PassManager
 from numba.core.registry import CPUDispatcher
 
-from .. import compiled
 from .integer_enums import register_integer_enums
 from .machine import create_pass_builder, create_target_machine
 from .pass_by_reference import get_argument_type
@@ -49,22 +47,11 @@ NUMBA_PASSES = (
 register_integer_enums()
 
 
-def store_on_disk(function):
-    """Make a numba dispatcher, `function`, store its machine code in the cache folder, and return it."""
-    compiled.set_cache_folder()
-    with suppress(RuntimeError):  # a function without a source file is compiled by every process
-        function.enable_caching()
-    return function
-
-
-def njit(cache: bool = False, **options):
-    """Return `numba.njit`, or a decorator that compiles a function only within its callers.
+def njit(**options):
+    """Return a decorator that compiles a function only within its callers.
 
     Parameters
     ----------
-    cache : bool
-        Whether the machine code is stored on disk, as by `numba.njit`. Other functions are compiled only within their
-        callers.
     **options
         Options of `numba.njit`. Numba hands `forceinline=True` on to every function that the decorated one calls, and to
         those that these call, unless they set `forceinline=False`. Only functions that call little may set it: the bond
@@ -72,8 +59,6 @@ def njit(cache: bool = False, **options):
     """
     if numba.config.DISABLE_JIT:
         return lambda function: function
-    if cache:
-        return lambda function: store_on_disk(numba.njit(**NO_C_WRAPPER, **options)(function))
     options = {"nopython": True, "boundscheck": None, **options}
     return lambda function: InlinedDispatcher(function, {}, options, UnoptimisedCompiler)
 
@@ -99,10 +84,6 @@ class InlinedDispatcher(CPUDispatcher):
     def __call__(self, *arguments):
         return self._standalone(*arguments)
 
-    def get_standalone(self) -> CPUDispatcher:
-        """Return the dispatcher for calls from Python, whose machine code is stored on disk."""
-        return store_on_disk(self._standalone)
-
 
 def compile_unoptimised(
     function, arguments: tuple[object, ...]
@@ -111,7 +92,7 @@ def compile_unoptimised(
 
     Parameters
     ----------
-    function : numba dispatcher
+    function : InlinedDispatcher
         Function before its compilation.
     arguments : tuple
         Arguments by whose types the function is compiled.
@@ -121,19 +102,15 @@ def compile_unoptimised(
     target : numba target context
     result : numba CompileResult
     """
-    options = function.targetoptions | NO_C_WRAPPER | NO_PYTHON_WRAPPER
-    dispatcher = CPUDispatcher(function.py_func, function.locals, options, UnoptimisedCompiler)
-    argument_types = tuple(
-        get_argument_type(dispatcher.typeof_pyval(argument)) for argument in arguments
-    )
+    argument_types = tuple(get_argument_type(function.typeof_pyval(value)) for value in arguments)
     # Numba optimises its own functions for this CPU, whose vector instructions do not belong into portable code.
     is_vectorised = numba.config.LOOP_VECTORIZE
     numba.config.LOOP_VECTORIZE = False
     try:
-        dispatcher.compile(argument_types)
+        function.compile(argument_types)
     finally:
         numba.config.LOOP_VECTORIZE = is_vectorised
-    return dispatcher.targetctx, dispatcher.overloads[argument_types]
+    return function.targetctx, function.overloads[argument_types]
 
 
 class UnoptimisedCompiler(Compiler):

@@ -4,8 +4,8 @@ Numba takes half a second before it can load a function from its cache, because 
 machine code of a function is stored a second time, together with an entry function that reads the arguments from a
 buffer of 8-byte words (status, results, then arguments as numba flattens them). `load_file` loads this file by llvmlite.
 
-This is possible for functions of floats, integers, arrays and tuples of these that call only the C library; numba runs
-others and loads them from its cache. A file consists of one line of JSON and an object file.
+This is possible for functions of floats, integers, arrays and tuples of these that call only the C library; numba compiles
+others in every process. A file consists of one line of JSON and an object file.
 
 A function is compiled in two steps. The first one makes LLVM code that names no CPU: numba translates the function and all
 that it calls, and LLVM optimises them together with the entry function. The second one, without numba, adds the vector
@@ -15,15 +15,11 @@ instructions of this CPU where the function asks for them and emits the object f
 import ctypes
 import hashlib
 import json
-import os
 import re
 import struct
-import threading
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple
 
 import numpy as np
 
@@ -33,104 +29,60 @@ from ..disk import user_cache
 NUMBA_SUCCESS_CODES = (0, -2)
 # Type code of `struct` for each type of number that a function takes.
 STRUCT_TYPE_CODES = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
-_ARRAY_FORMATS = {}  # `ArrayFormat` for each (dtype, number of dimensions, flags) of an array
+# Type code and words of the last tuples by their `id`. A run passes the same few in many calls.
+_KNOWN_TUPLES: dict[int, tuple[object, str, bytes]] = {}
+MAX_KNOWN_TUPLES = 64  # number of tuples, nested ones included, whose words are kept
+# Bits of `numpy.ndarray.flags.num`, and those by which numba distinguishes arrays: orders, aligned, writeable
+C_ORDER = 0x1
+FORTRAN_ORDER = 0x2
+NUMBA_FLAGS = C_ORDER | FORTRAN_ORDER | 0x100 | 0x400
 # Portable code of the functions that numba compiled in this process, by the names of their files.
 PORTABLE_CODES: dict[str, bytes] = {}
-# Number of tuples whose words are cached. A run passes the same few in many calls, of several functions in turn.
-MAX_CACHED_TUPLES = 12
 
 
 class UnsupportedError(Exception):
     """Function or argument that this module does not support."""
 
 
-class ArgumentConverter:
-    """Converter of call arguments to machine words, with a cache for tuples, which are immutable."""
+def convert_argument(value) -> tuple[str, bytes]:
+    """Return the type code and the machine words (bytes) of an argument `value`.
 
-    def __init__(self):
-        self.known_tuples = {}
-        self.lock = threading.Lock()
-
-    def convert(self, value) -> tuple[str, bytes]:
-        """Return the type code and the machine words (bytes) of an argument `value`.
-
-        Raises UnsupportedError for a type that compiled code cannot take. A tuple that contains only numbers is not
-        cached.
-        """
-        code = STRUCT_TYPE_CODES.get(type(value))
-        if code is not None:
-            return code, struct.pack(code, value)
-        if isinstance(value, np.ndarray):
-            return _convert_array(value)
-        if not isinstance(value, tuple):
-            raise UnsupportedError
-
-        # A tuple of numbers is made for a single call and would displace others from the cache.
-        codes = [STRUCT_TYPE_CODES.get(type(element)) for element in value]
-        if None not in codes:
-            return _name_tuple(value, codes), struct.pack("".join(codes), *value)
-
-        # A cached tuple stands as (tuple, type code, words) at its `id`. The one used last is at the end.
-        with self.lock:
-            known = self.known_tuples.pop(id(value), None)
-            if known is not None:
-                self.known_tuples[id(value)] = known
-        if known is None:
-            codes, words = zip(*map(self.convert, value))
-            # The tuple itself is cached too, so that no other object gets its `id`.
-            known = value, _name_tuple(value, codes), b"".join(words)
-            with self.lock:
-                self.known_tuples[id(value)] = known
-                while len(self.known_tuples) > MAX_CACHED_TUPLES:
-                    del self.known_tuples[next(iter(self.known_tuples))]
-        return known[1:]
-
-
-def _name_tuple(value, codes) -> str:
-    """Return the type code of a tuple whose elements have given type codes."""
-    return f"{type(value).__name__}({','.join(codes)})"
-
-
-class ArrayFormat(NamedTuple):
-    """Format in which arrays of one type are converted to machine words.
-
-    - type_code: dtype, number of dimensions, memory order, and "r" for read-only or "u" for unaligned arrays
-    - pack: function that packs the words
-    - is_buffer: whether the array is C-contiguous and writeable, so `ctypes` can take its address
+    Raises UnsupportedError for a type that compiled code cannot take. Tuples are immutable, so that their words are kept.
     """
+    code = STRUCT_TYPE_CODES.get(type(value))
+    if code is not None:
+        return code, struct.pack(code, value)
+    if isinstance(value, np.ndarray):
+        return _convert_array(value)
+    if not isinstance(value, tuple):
+        raise UnsupportedError
 
-    type_code: str
-    pack: Callable[..., bytes]
-    is_buffer: bool
+    # The tuple itself is kept too, so that no other object gets its `id`.
+    known = _KNOWN_TUPLES.get(id(value))
+    if known is None:
+        codes, words = zip(*map(convert_argument, value)) if value else ((), ())
+        known = value, f"{type(value).__name__}({','.join(codes)})", b"".join(words)
+        if len(_KNOWN_TUPLES) >= MAX_KNOWN_TUPLES:
+            _KNOWN_TUPLES.clear()
+        _KNOWN_TUPLES[id(value)] = known
+    return known[1:]
 
 
 def _convert_array(array) -> tuple[str, bytes]:
     """Return the type code and the machine words (bytes) of an array."""
-    key = array.dtype, array.ndim, array.flags.num
-    known = _ARRAY_FORMATS.get(key)
-    if known is None:
-        known = _ARRAY_FORMATS[key] = _make_array_format(array)
-    # `__array_interface__` takes 3 us, which matters in a short call.
-    if known.is_buffer and array.size:
-        address = ctypes.addressof(ctypes.c_char.from_buffer(array))
-    else:
-        address = array.__array_interface__["data"][0]
-    words = known.pack(0, 0, array.size, array.itemsize, address, *array.shape, *array.strides)
-    return known.type_code, words
+    words = 0, 0, array.size, array.itemsize, array.ctypes.data, *array.shape, *array.strides
+    code = _name_array_type(array.dtype, array.ndim, array.flags.num)
+    return code, struct.pack(f"{len(words)}q", *words)
 
 
-def _make_array_format(array) -> ArrayFormat:
-    """Return type code and packing of arrays with the type, dimensions and layout of this array."""
-    flags = array.flags
-    order = "A"
-    if flags.c_contiguous:
-        order = "C"
-    elif flags.f_contiguous:
-        order = "F"
-    restrictions = ("" if flags.writeable else "r") + ("" if flags.aligned else "u")
-    type_code = f"{array.dtype.str}{array.ndim}{order}{restrictions}"
-    pack = struct.Struct(f"{5 + 2 * array.ndim}q").pack
-    return ArrayFormat(type_code, pack, order == "C" and flags.writeable)
+@cache
+def _name_array_type(dtype: np.dtype, n_dimensions: int, flags: int) -> str:
+    """Return the type code of arrays with a type, a number of dimensions and flags (`numpy.ndarray.flags.num`)."""
+    if flags & C_ORDER:
+        flags &= (
+            ~FORTRAN_ORDER
+        )  # numba too reads an array of both orders, such as a row, as one of C order
+    return f"{dtype.str}{n_dimensions}-{flags & NUMBA_FLAGS}"
 
 
 class LoadedFunction:
@@ -140,20 +92,19 @@ class LoadedFunction:
     ----------
     address : int
         Address of the machine code in memory.
-    result_format : str or list
-        Format of the result (`_describe_result`).
-    nogil : bool
-        Whether the function releases the global interpreter lock.
+    results : str
+        Characters of the results, as in `struct`.
+    is_tuple : bool
+        Whether the function returns a tuple of them.
     """
 
-    def __init__(self, address: int, result_format, *, nogil: bool = False):
-        # CFUNCTYPE releases the global interpreter lock during the call, PYFUNCTYPE keeps it.
-        prototype = ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE
-        self.call = prototype(None, ctypes.c_void_p)(address)
-        self.result_format = result_format
-        self.flat_format = _flatten_format(result_format)
+    def __init__(self, address: int, results: str, *, is_tuple: bool):
+        # PYFUNCTYPE keeps the global interpreter lock during the call.
+        self.call = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)(address)
+        self.results = results
+        self.is_tuple = is_tuple
         # Words of the status and of the results, which precede the arguments.
-        self.header = bytes(8 * (1 + max(len(self.flat_format), 1)))
+        self.header = bytes(8 * (1 + max(len(results), 1)))
 
     def __call__(self, words: bytes):
         """Call the function and return its result.
@@ -165,30 +116,10 @@ class LoadedFunction:
         status = struct.unpack_from("q", buffer)[0]
         if status not in NUMBA_SUCCESS_CODES:
             raise RuntimeError(f"compiled code ended with status {status}")
-        values = struct.unpack_from(self.flat_format, buffer, 8)
-        return _build_result(self.result_format, iter(values))
-
-
-def _flatten_format(result_format) -> str:
-    """Return the characters, as in `struct`, of all numbers of a result in their order in memory.
-
-    `result_format` is the character of a number, or a list of the formats of the elements of a tuple.
-    """
-    if isinstance(result_format, str):
-        return result_format
-    return "".join(map(_flatten_format, result_format))
-
-
-def _build_result(result_format, values):
-    """Return a result of this format from an iterator over its numbers, `values`.
-
-    `result_format` is the character of a number, a list of the formats of the elements of a tuple, or "" for None.
-    """
-    if result_format == "":
-        return None
-    if isinstance(result_format, str):
-        return next(values)
-    return tuple(_build_result(element, values) for element in result_format)
+        values = struct.unpack_from(self.results, buffer, 8)
+        if self.is_tuple:
+            return values
+        return values[0] if values else None
 
 
 def load_file(path: Path) -> LoadedFunction | None:
@@ -206,13 +137,11 @@ def load_code(content: bytes) -> LoadedFunction | None:
     """Load a function from the content of its file; return None if this machine cannot use it."""
     try:
         header, code = split_file(content)
-        if not (os.name == "posix" and all(map(_is_in_c_library, header["calls"]))):
-            return None
         engine = _create_engine()
         engine.add_object_file(_import_binding().ObjectFileRef.from_data(code))
         engine.finalize_object()
         address = engine.get_function_address(header["name"])
-        return LoadedFunction(address, header["results"], nogil=header["nogil"])
+        return LoadedFunction(address, header["results"], is_tuple=header["is_tuple"])
     except (ValueError, KeyError, ImportError, RuntimeError):
         return None
 
@@ -266,7 +195,7 @@ def compile_function(
     ----------
     path : Path
         File of the machine code.
-    function : numba dispatcher
+    function : jit.InlinedDispatcher
         Function before its compilation.
     arguments : tuple
         Arguments whose types select the version to compile.
@@ -280,14 +209,11 @@ def compile_function(
     LoadedFunction or None
         None if the function cannot be compiled in this way.
     """
-    if os.name != "posix":
-        return None
     try:
         target, result = compiler(function, arguments)
         header = {
             "name": "patchfem_" + hashlib.sha256(path.name.encode()).hexdigest()[:16],
-            "results": _describe_result(result.signature.return_type),
-            "nogil": bool(function.targetoptions.get("nogil")),
+            **_describe_result(result.signature.return_type),
             "is_vectorised": is_vectorised,
         }
         text = _write_portable_code(target, result, header)
@@ -331,8 +257,8 @@ def compile_for_this_cpu(path: Path, portable: bytes) -> LoadedFunction | None:
     # What is declared but not defined here must be found in the C library when the code is loaded.
     symbols = (*module.functions, *module.global_variables)
     declared = [symbol.name for symbol in symbols if symbol.is_declaration]
-    header["calls"] = [name for name in declared if not name.startswith("llvm.")]
-    if not all(map(_is_in_c_library, header["calls"])):
+    called = [name for name in declared if not name.startswith("llvm.")]
+    if not all(map(_is_in_c_library, called)):
         return None
     content = join_file(header, target_machine.emit_object(module))
     user_cache.write_cache_file(path, content)
@@ -357,28 +283,19 @@ def split_file(content: bytes) -> tuple[dict[str, object], bytes]:
     return header, code
 
 
-def _describe_result(kind):
-    """Return the format of a result of the numba type `kind`.
+def _describe_result(kind) -> dict[str, object]:
+    """Return `LoadedFunction.results` and `LoadedFunction.is_tuple` by name, for a result of the numba type `kind`.
 
-    Raises UnsupportedError for types that compiled code cannot return. The format is "d" for a float, "q" for an
-    integer, "" for None, "?" for a boolean, and a list of formats for a tuple.
+    Raises UnsupportedError for types that compiled code cannot return.
     """
     from numba.core import types
 
-    if kind == types.boolean:
-        return "?"
-    if isinstance(kind, types.NoneType):
-        return ""
-    if isinstance(kind, types.BaseTuple):
-        # A boolean in a tuple takes one byte, not a word of eight.
-        if types.boolean in kind.types:
-            raise UnsupportedError
-        return [_describe_result(element) for element in kind]
-    if kind == types.float64:
-        return "d"
-    if isinstance(kind, types.Integer) and kind.bitwidth == 64 and kind.signed:
-        return "q"
-    raise UnsupportedError
+    is_tuple = isinstance(kind, types.BaseTuple)
+    kinds = kind.types if is_tuple else (kind,)
+    codes = {types.float64: "d", types.int64: "q", types.none: ""}
+    if not codes.keys() >= set(kinds):
+        raise UnsupportedError
+    return {"results": "".join(codes[one] for one in kinds), "is_tuple": is_tuple}
 
 
 def _write_portable_code(target, result, header: dict[str, object]) -> str:
@@ -396,7 +313,7 @@ def _write_portable_code(target, result, header: dict[str, object]) -> str:
     from llvmlite import binding
 
     linked = result.library._get_module_for_linking().clone()
-    n_result_words = max(len(_flatten_format(header["results"])), 1)
+    n_result_words = max(len(header["results"]), 1)
     entry_text = _write_entry_function(target, result, header["name"], n_result_words, linked)
     linked.link_in(binding.parse_assembly(entry_text))
 

@@ -449,7 +449,7 @@ def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
     return set_hash
 
 
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_set(sets, slot, d, t):
     """Find the contact set at a rigid displacement, starting from a neighbouring set.
 
@@ -486,7 +486,7 @@ def find_set(sets, slot, d, t):
     return -1
 
 
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def build_first_set(sets, set_hash):
     """Compute the target contact set from an empty tableau, and return its slot.
 
@@ -535,7 +535,7 @@ def compute_energy(sets, slot, heave, rotation):
     return ContactEnergy(value, -(linear_d + by_d), linear_t + by_t)
 
 
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_state(sets, slot, d, t, force):
     """Compute load, moment, energy and forces of a contact at a rigid displacement.
 

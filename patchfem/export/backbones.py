@@ -30,6 +30,7 @@ from .answer import (
 )
 from .charts import axes
 from .netcdf import from_dataset
+from .rows import make_details
 from .runs import make_origin
 
 # Columns of a curve and of its band, their units, and words for them in a sentence
@@ -135,12 +136,11 @@ def _make_quantities(backbone: Backbone) -> Quantities:
             out[f"{name}_at_smallest_amplitude"] = _make_point_quantity(curve, name, 0)
             out[f"{name}_at_largest_amplitude"] = _make_point_quantity(curve, name, -1)
         out["largest_damping"] = _make_point_quantity(curve, "damping", largest)
-        # A parabola through the point and its neighbours has its vertex within half their distances. At an end of the
-        # curve nothing encloses the peak.
-        error = None
-        if 0 < largest < curve.amplitude.size - 1:
-            error = np.diff(curve.amplitude[largest - 1 : largest + 2]).max() / 2
-        out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m", error)
+        # the peak lies between the neighbours of the point; at an end of the curve nothing encloses it
+        near = curve.amplitude[max(largest - 1, 0) : largest + 2]
+        ends = near[[0, -1]] if near.size == 3 else (None, None)
+        amplitude = Quantity(curve.amplitude[largest], "m", None, *ends)
+        out["amplitude_of_largest_damping"] = amplitude
 
     # a missing frequency is shown with its reason, other missing values are left out
     out |= {
@@ -275,28 +275,19 @@ def _find_unit(name: str) -> str:
 
 def _make_details(backbone: Backbone) -> JsonObject:
     """Return the content of backbone.json in SI units."""
-    frequencies = backbone.frequencies
     band = backbone.band
     curves = {}
     for method, curve in backbone.curves.items():
         curves[method] = {name: getattr(curve, name) for name in CURVE_COLUMNS}
 
     # A backbone without a band has None in place of its method and columns
-    return {
-        "mode": backbone.mode,
-        "free_frequency": frequencies.free,
-        "free_frequency_error": frequencies.free_error,
-        "stuck_frequency": frequencies.stuck,
-        "stuck_frequency_error": frequencies.stuck_error,
-        "curves": curves,
-        "missing": backbone.missing,
-        "exponent": backbone.exponents,
-        "flutter_amplitude": backbone.flutter,
-        "notes": backbone.notes,
-        "method": band and band.method,
-        "band": band and {name: getattr(band, name) for name in BAND_COLUMNS},
-        "advice": " ".join(backbone.advice),
-    }
+    return make_details(
+        "backbone",
+        backbone,
+        curves=curves,
+        band=band and {name: getattr(band, name) for name in BAND_COLUMNS},
+        advice=" ".join(backbone.advice),
+    )
 
 
 def _make_cases_answer(cases: BackboneCases) -> Answer:

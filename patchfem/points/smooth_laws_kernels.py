@@ -55,9 +55,9 @@ class Branch(NamedTuple):
     """Curve of the force between two turns.
 
     - start: slide at the start of the step [m]
-    - direction: of the motion, 1 or -1
-    - length, path: slide from the start of the branch, and from that of the step, to the corner at which all sliders
-      slip [m]; the path is inf without such a corner
+    - direction: of the motion, 1 or -1, or 0 during stick of a law that is linear between events
+    - length, path: slide from the start of the branch, and from that of the step, to the corner of the curve, at which all
+      sliders slip or the force of BOUC_WEN is 0 [m]; the path is inf without such a corner
     """
 
     start: float
@@ -281,12 +281,40 @@ def follow_sliders(law, dq, commits):
 
 
 @njit(**NJIT_KERNEL)
+def find_path_to_rest(stretch, numbers):
+    """Return the path to the corner of the law of Bouc and Wen at the stretch 0, where unloading ends; inf if it has ended.
+
+    The path is the integral of 1/(1 - (1 - 2 SHAPE) |z|^EXPONENT) over the stretch z by Simpson's rule.
+
+    Parameters
+    ----------
+    stretch : float
+        Stretch along the motion relative to the length.
+    numbers : (k,) array
+        Numbers of the law.
+    """
+    if stretch >= -CORNER_TOLERANCE:
+        return inf
+    unloading = 1 - 2 * numbers[LawNumber.SHAPE]
+    if unloading == 0:
+        return -stretch
+    size = -stretch
+    end = 1 - unloading * size ** numbers[LawNumber.EXPONENT]
+    middle = 1 - unloading * (0.5 * size) ** numbers[LawNumber.EXPONENT]
+    return size / 6 * (1 + 4 / middle + 1 / end)
+
+
+@njit(**NJIT_KERNEL)
 def find_branch(first, law):
     """Return the `Branch` of a law on which the motion goes on from an `Instant`."""
     numbers = law.numbers
     memory = law.memory
     rate = first.velocity if first.velocity != 0 else first.acceleration
     direction = 1.0 if rate > 0 else -1.0
+    length = numbers[LawNumber.LENGTH]
+    if numbers[0] == Law.BOUC_WEN:
+        path = length * find_path_to_rest(direction * memory[Memory.STRETCH] / length, numbers)
+        return Branch(first.slide, direction, length, path)
     if numbers[0] != Law.MASING:
         return Branch(first.slide, direction, 1.0, inf)
     n = int(memory[Masing.COUNT])
@@ -295,7 +323,8 @@ def find_branch(first, law):
         return Branch(first.slide, direction, 1.0, inf)
 
     # A branch after a turn is twice as long as the first loading.
-    length = numbers[LawNumber.LENGTH] if n == 0 and not turns else 2 * numbers[LawNumber.LENGTH]
+    if n > 0 or turns:
+        length *= 2
     start = memory[Masing.STACK + 2 * n - 2] if n > 0 else 0.0
     if turns:
         start = memory[Masing.SLIDE]
@@ -336,6 +365,8 @@ def find_share(at, branch, numbers):
     law = numbers[0]
     if law == Law.TANH:
         return 1.0
+    if law <= Law.JENKINS:
+        return abs(branch.direction)
 
     # The sliders that slip carry B - x B' of the limit, with the force B of first loading at the displacement x.
     if law == Law.MASING:

@@ -206,8 +206,6 @@ def _advise_mesh(
         return Advice(f"{cause}leave out {ELEMENT_SIZE_KEY}", ELEMENT_SIZE_KEY)
     if missed.is_limited("mesh"):
         return _advise_limit(missed, "finer meshes", cause)
-    if any(patch_model.mesh.shared is not None for patch_model, _ in solved):
-        return Advice(f"{cause}run this case by itself, so that its mesh is refined")
     # The main measures have decided on the mesh; another measure needs a smaller tolerance.
     tolerance = PROPOSED_TOLERANCE_RATIO * missed.model.accuracy.tolerance
     is_at_limit = is_at_limit or refine.is_main(missed.worst)
@@ -301,12 +299,12 @@ def _advise_steps(missed: Missed) -> Advice | None:
 def _advise_motion_mesh(missed: Missed) -> Advice | None:
     """Return the advice to refine the meshes on which the motion depends; None if there are none.
 
-    These are the meshes of the interfaces in which some nodes stick while others slip, or that of the only patch.
+    These are the meshes of the interfaces whose motion follows from the pressure at each place, or that of the only patch.
     """
     solved = [
         (face.model.patch, face.unworn or face.patches)
         for face in missed.faces
-        if face.partial_slip or missed.model.patch is not None
+        if face.depends_on_pressure or missed.model.patch is not None
     ]
     return _advise_mesh(missed, solved) if solved else None
 

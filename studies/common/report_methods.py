@@ -41,9 +41,9 @@ class Law(NamedTuple):
 
 
 def load_kernels():
-    """Return the compiled loops, from the folder of compiled code."""
+    """Return the compiled loops, whose machine code is stored as that of the package."""
     text = KERNELS.read_text("utf-8")
-    return compiled.write_kernel_module(f"report_methods_{compiled.hash_text(text)}", text)
+    return compiled.make_kernel_module(f"report_methods_{compiled.hash_text(text)}", text, KERNELS)
 
 
 def coulomb(limit: float, stick_speed: float = 0.0) -> Law:

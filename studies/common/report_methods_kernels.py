@@ -29,7 +29,7 @@ def dot(row, x):
     return out
 
 
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def law_force(law, speed, travel, before, hold):
     """Return the friction force [N] at a slide speed [m/s].
 
@@ -71,7 +71,7 @@ def holding_force(rig, accel, force):
     return force + dot(face, accel) * mass / dot(face, face)
 
 
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def duhamel_loop(rig, maps, stop, drive, law, history, residual, workspace):
     """Integrate by Duhamel's integral and fixed-point iteration; return the number of steps that did not converge.
 
@@ -143,7 +143,7 @@ def arrest(rig, v, accel, force):
     return force + slide_accel * mass / square
 
 
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def newmark_loop(rig, maps, drive, law, needs_force, history, workspace):
     """Integrate by average acceleration with Coulomb's law.
 
@@ -210,7 +210,7 @@ def newmark_loop(rig, maps, drive, law, needs_force, history, workspace):
         force[k + 1] = min(max(now, -limit), limit)
 
 
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def euler_loop(rig, h, drive, law, history, workspace):
     """Integrate by explicit steps of h [s]: z += h z', z' += h z'', with all rates from the start of the step."""
     z, v, force = history

@@ -47,5 +47,4 @@ def test_exact_rig_without_friction_shares_compiled_code():
     point = PointSet(make_coulomb(1.0, 1.0, LIMIT), np.ones(1))
     contacts = Contact([]), Contact([point], LIMIT)
     systems = [March(make_modes(), DRIVE, contact, 10).system for contact in contacts]
-    converter = compiled.machine.ArgumentConverter()
-    assert len({converter.convert(system)[0] for system in systems}) == 1
+    assert len({compiled.machine.convert_argument(system)[0] for system in systems}) == 1

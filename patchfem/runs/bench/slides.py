@@ -8,7 +8,7 @@ force.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -33,14 +33,15 @@ N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a 
 CREATED_ENERGY_ROUND_OFF = 1e-13
 
 
-class SlideHistories(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class SlideHistories:
     """Histories of force, slip and energies of a bench run, at k samples.
 
     - force, load (k,): friction force and normal load [N].
     - slip (k,): irreversible part of the displacement [m].
     - ledger (4, k): cumulative work, stored energy, cumulative dissipated and created energy [J].
     - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
-    - shear_modes: number of shear modes of the pieces; None without modes.
+    - contact: contact points that followed the path; None for other methods.
     - join_error: largest error of a join that made room in a full list of bonds, relative to the load.
     """
 
@@ -50,7 +51,7 @@ class SlideHistories(NamedTuple):
     ledger: np.ndarray
     tau: np.ndarray
     local: np.ndarray
-    shear_modes: int | None = None
+    contact: "time_steps.contacts.Contact | None" = None
     join_error: float = 0.0
 
 
@@ -411,10 +412,8 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
         local = task.slide[frames, None] - stretch
     work = motion.mean * np.diff(task.slide)
     ledger = stack_energies(work, motion.stored, motion.losses)
-    shape = contact.point_sets[0].shear
-    count = None if shape is None else shape.stiffness.size
     return SlideHistories(
-        motion.force, load, local_slip, ledger, tau, local, count, motion.join_error
+        motion.force, load, local_slip, ledger, tau, local, contact, motion.join_error
     )
 
 

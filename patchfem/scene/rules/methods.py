@@ -11,7 +11,6 @@ from ...effects import (
     law_has_trait,
     law_supports,
     law_takes_stiffness_or_length,
-    needs_bond_list,
     suggest_laws,
 )
 from ..keys.contact import Contact
@@ -72,6 +71,7 @@ class MotionFeatures(NamedTuple):
             "load": self.load_change,
             "yaw": "with bands that yaw" if self.bands_yaw else "",
             "yaw-levels": "",
+            "yaw-parts": "",
             "parts": f"with {self.compliance}" if self.compliance else "",
             "grooves": f"with {self.grooves}" if self.grooves else "",
             "spring": f"with {self.spring}" if self.spring else "",
@@ -82,6 +82,8 @@ class MotionFeatures(NamedTuple):
         }
         if words["yaw"] and words["levels"]:
             words["yaw-levels"] = f"{words['yaw']} and waveform 'levels'"
+        if words["yaw"] and words["parts"]:
+            words["yaw-parts"] = f"{words['yaw']} {words['parts']}"
         return words
 
 
@@ -105,7 +107,7 @@ ENGINE_SUPPORT = {
     "exact": EngineSupport("exact", "no-law yaw faces"),
     "piecewise": EngineSupport("pieces", "parts faces"),
     "march": EngineSupport(
-        "march", "no-law load yaw yaw-levels parts grooves spring faces levels pressed"
+        "march", "no-law load yaw yaw-levels yaw-parts parts grooves spring faces levels pressed"
     ),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces"),
 }
@@ -175,6 +177,8 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     of a fixed number of values.
     """
     law = joint.law.law
+    if not (law_supports(joint.law, "harmonic") or law_supports(joint.law, "exact")):
+        return False
     if motion.grooves:
         return law_has_trait(law, "memoryless") and not (joint.compliance or joint.is_uneven)
     if joint.compliance:
@@ -183,7 +187,7 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
         # Regimes of the elastic-plastic law have springs that come and go with the load.
         is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)
         return law in VARYING_LAWS and not is_fixed
-    return not (needs_bond_list(joint.law) or motion.lower_shape or joint.is_uneven)
+    return not (motion.lower_shape or joint.is_uneven)
 
 
 def check_accuracy_method(draft: SceneDraft, kind: str) -> None:
