@@ -286,16 +286,18 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     for name in ("seconds", "wall_seconds", "timings"):
         columns[name] = [getattr(run, name) for run in runs]
     data = make_variables("cost", **columns)
-    columns = {}
+
+    measures = {}
     units = {name: one.unit for run in runs for name, one in run.measures.items()}
     for name, unit in units.items():
         for heading, part in ((name, "value"), (f"error_{name}", "error")):
             numbers = [getattr(run.measures.get(name), part, None) for run in runs]
-            columns[heading] = (numbers, unit)
+            measures[heading] = (numbers, unit)
+
+    data |= make_columns("run", measures)
 
     # an exact run has no place on a logarithmic axis
-    data |= make_columns("run", columns)
-    columns = {
+    judged = {
         "largest_error": [row.worst.fraction or None for row in rows],
         "tolerance": [run.tolerance for run in runs],
         "worst_measure": [row.worst.name.replace("_", " ") for row in rows],
@@ -303,8 +305,8 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     for name in ("nodes", "steps"):
         counts = [getattr(run, name) for run in runs]
         if any(counts):
-            columns[name] = counts
-    data |= make_variables("cost", **columns)
+            judged[name] = counts
+    data |= make_variables("cost", **judged)
     data |= {"main_measure": data[main], "main_measure_error": data[f"error_{main}"]}
 
     # a colour for each varied setting and for runs that miss the tolerance
