@@ -48,14 +48,13 @@ from .export.charts import axes as chart_axes
 from .export.fields import grids
 from .export.folder import Folder
 from .export.surfaces import compare as compared
-from .export.surfaces import pairs as compared_pairs
 from .export.surfaces import roughness, worn
 from .export.sweeps import dataset as sweep_datasets
 from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
 from .model.model import Model, build_without_sweep
 from .model.model import build as build_model
-from .runs.batch import batches, meshes
+from .runs.batch import batches
 from .runs.patch import result as patch_result
 from .runs.plan import Plan
 from .runs.plan import plan as plan_model
@@ -411,14 +410,14 @@ def cost(
     say: Callable[[str], None] | None = None,
     **sets: Any,
 ) -> dict[str, Any]:
-    """Measure numerical error against CPU time for several tolerances, or for values of one setting.
+    """Measure numerical error against CPU time for several tolerances and over the mesh or the steps.
 
     Parameters
     ----------
     scene : path, str, dict, Scene or Model
         As for `build`.
     over : str, optional
-        Setting to vary instead of the tolerance: "element_size", "steps_per_cycle", "shear_modes" or "jumps".
+        Only setting to vary: "element_size", "cells", "steps_per_cycle", "shear_modes" or "jumps".
     out : path, optional
         Folder for cost.csv and the page. Default: no files are written.
     say : callable, optional
@@ -429,11 +428,12 @@ def cost(
     Returns
     -------
     dict
-        The output of `patchfem cost --json`: an entry "tolerance", or one with the name of the setting, with the list
-        `runs`. Each run has its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error
+        The output of `patchfem cost --json`: an entry "tolerance", and one with the name of the setting, each with the list
+        `runs`; and the list `convergence` with the finest value, the observed order and the relative `changes` of each
+        measure. Each run has its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error
         (relative to the allowed error at a tolerance of 1), `meets_tolerance`, the advice from its warnings as `remedies`,
-        and for each measure its value in `values` and its error estimate in `errors`, in SI units. For a setting,
-        the entry has `sentence`.
+        and for each measure its value in `values` and its error estimate in `errors`, in SI units. The entry of a setting
+        has `sentence`.
 
     Raises
     ------
@@ -452,10 +452,8 @@ def cost(
     """
     model = build(scene, **sets)
     over = numerical_settings.SCENE_KEYS.get(_require_string(over, "cost: over"), over)
-    setting = over or cost_curves.TOLERANCE_SETTING
     report = _print_to_stderr if say is None else say
-    curve = cost_curves.compute_setting_costs(model, setting, report)
-    answer = costs.make_answer({setting: curve}, model)
+    answer = costs.make_answer(cost_curves.compute_costs(model, over, report), model)
     if out is not None:
         _save(lambda _: answer, out)
     return answer.details
@@ -750,8 +748,7 @@ def run_many(
 ) -> CaseResults:
     """Run several scenes or models, and return their measures as arrays with one element per model.
 
-    Similar models are computed together in batches, with the same results as single runs. Patches of equal geometry on
-    benches have a common mesh, as in a sweep.
+    Similar models are computed together in batches, with the same results as single runs.
 
     Parameters
     ----------
@@ -781,8 +778,7 @@ def run_many(
     if isinstance(models, str | Path | Scene | Model | Mapping) or not isinstance(models, Iterable):
         models = [models]
     return batches.solve_models(
-        meshes.with_shared_meshes([build(model) for model in models]),
-        report=_print_to_stderr if say is None else say,
+        [build(model) for model in models], report=_print_to_stderr if say is None else say
     )
 
 
@@ -1252,7 +1248,7 @@ def compare(
             raise PatchfemError(
                 "compare: give the table of pairs alone, without files or predicted"
             )
-        return compared_pairs.answer_pairs(_require_path(pairs, "compare: pairs"), options).details
+        return compared.answer_pairs(_require_path(pairs, "compare: pairs"), options).details
     if len(files) == 4:
         raise PatchfemError(describe_removed("compare of four files"))
     if len(files) != 2:

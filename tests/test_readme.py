@@ -7,18 +7,15 @@ import math
 import re
 import shlex
 import shutil
-from functools import cache
 from pathlib import Path
 
 import pytest
 from command_line import read_json, run_cli, run_successfully
 
 import patchfem as pf
-from patchfem.core import G_N
 
 ROOT = Path(__file__).parents[1]
 GUIDE = ROOT / "patchfem/scene/guide"
-MIL = 25.4e-6  # m
 
 
 def test_exact_version_agrees_in_all_documents(tmp_path):
@@ -40,16 +37,19 @@ def read_page(page: str) -> str:
     return (ROOT / page).read_text("utf-8")
 
 
-def test_always_readme_has_at_most_150_lines():
-    """The README has at most 150 lines."""
-    assert len(read_page("README.md").splitlines()) <= 150
+@pytest.mark.parametrize("page, words", [("README.md", 1000), ("studies/README.md", 1500)])
+def test_always_first_pages_are_short(page: str, words: int):
+    """The README has at most 1000 words and 120 lines, the index of studies at most 1500 words."""
+    text = read_page(page)
+    assert len(text.split()) <= words
+    assert page != "README.md" or len(text.splitlines()) <= 120
 
 
 def test_always_guide_pages_are_short():
-    """The guide has at most 8000 words and each page at most 1500; a page begins with its question and ends with links."""
+    """The guide has at most 9000 words and each page at most 900; a page begins with its question and ends with links."""
     pages = {path.name: path.read_text("utf-8").rstrip("\n") for path in GUIDE.glob("*.md")}
     words = {name: len(page.split()) for name, page in pages.items()}
-    assert max(words.values()) <= 1500 and sum(words.values()) <= 8000, words
+    assert max(words.values()) <= 900 and sum(words.values()) <= 9000, words
     for name, page in pages.items():
         first, last = page.splitlines()[0], page.split("\n\n")[-1]
         assert first.startswith("# ") and first.endswith("?"), name
@@ -57,8 +57,8 @@ def test_always_guide_pages_are_short():
 
 
 def test_always_gallery_lists_every_study():
-    """The gallery of studies links every script that can be run as a study."""
-    pages = read_page("studies/README.md")
+    """Index and answers of the studies link every script that can be run as a study."""
+    pages = [read_page(f"studies/{name}.md") for name in ("README", "answers")]
     runs = [
         path
         for path in (ROOT / "studies").glob("*/*.py")
@@ -69,15 +69,10 @@ def test_always_gallery_lists_every_study():
     lost = [
         path.name
         for path in runs
-        if path.name != "picture.py" and f"({path.relative_to(ROOT / 'studies')})" not in pages
+        if path.name != "picture.py"
+        and not all(f"({path.relative_to(ROOT / 'studies')})" in page for page in pages)
     ]
     assert lost == []
-
-
-@cache
-def run_shipped_rig():
-    """Return the measures of the shipped rig, computed once for several tests."""
-    return pf.run(ROOT / "studies/rig/rig.toml").measures
 
 
 def test_exact_readme_scene_and_settings_are_valid():
@@ -90,66 +85,6 @@ def test_exact_readme_scene_and_settings_are_valid():
     assert sets and all(
         loads(scene.text, sets=[f"{key}={value}"]).kind == "rig" for key, value in sets.items()
     )
-
-
-def test_exact_readme_amplitude_equals_shipped_rig():
-    """Amplitude, error and steady amplitude in the README equal those of the shipped rig in all printed digits."""
-    measures = run_shipped_rig()
-    amplitude = measures["relative_displacement_amplitude"]
-    steady = measures["relative_displacement_amplitude_steady"]
-    value, error, steady_value, steady_error, value_after_800_cycles = re.search(
-        r"amplitude after 200 cycles is ([\d.]+) um with an estimated error of ([\d.]+) um;.*?a steady "
-        r"amplitude of ([\d.]+) ± ([\d.]+) um; after 800 cycles it is ([\d.]+) um",
-        " ".join(read_page("README.md").split()),
-    ).groups()
-    assert (value, error) == (
-        f"{1e6 * amplitude.value:.{len(value) - 3}f}",
-        f"{1e6 * amplitude.error:.{len(error) - 2}f}",
-    )
-    assert f"Amplitude {value} ± {error} um" in read_page("studies/README.md")
-    assert (steady_value, steady_error) == tuple(
-        f"{1e6 * one:.3f}" for one in (steady.value, steady.error)
-    )
-    assert abs(float(value_after_800_cycles) - 1e6 * steady.value) < 1e6 * steady.error
-    (value_alone,) = re.findall(r"alone(?:, )? gives ([\d.]+) um", read_page("README.md"))
-    assert abs(float(value_alone) - 1e6 * amplitude.value) < 1e6 * amplitude.error
-
-
-def test_exact_readme_comparison_at_5_g_is_reproduced():
-    """The displacements at 5 g in the README are reproduced in all printed digits.
-
-    So are their ratios to the measured 0.23 mil.
-    """
-    found = re.search(r"- \*A real rig\..*?(?=^## )", read_page("README.md"), re.S | re.M)
-    bullet = " ".join(found[0].split())
-    amplitude = "relative_displacement_amplitude"
-    at_5_g = run_shipped_rig()[amplitude].value / MIL
-    assert (
-        f"displacement is {at_5_g:.3f} mil, {at_5_g / 0.23:.2f} times the measured 0.23 mil"
-        in bullet
-    )
-    second = pf.run(ROOT / "studies/table_1/second_path.toml").measures[amplitude].value / MIL
-    assert (
-        f"displacement at 5 g is {second:.3f} mil, {second / 0.23:.2f} times the measured one"
-        in bullet
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("index, frequency", [(1, 143), (3, 155)])
-def test_exact_readme_onset_of_the_shipped_rig_is_reproduced(index: int, frequency: int):
-    """The level from which on the shipped rig distorts its acceleration is that in the README, within its error."""
-    text = " ".join(read_page("README.md").split())
-    (stated,) = re.findall(
-        r"third harmonic from ([\d., and]+) g on at 135, 143, 150 and 155 Hz", text
-    )
-    onset = [float(level) for level in re.findall(r"[\d.]+", stated)][index]
-    scene = (ROOT / "studies/rig/rig.toml").read_text("utf-8").partition("[measured]")[0]
-    levels = ", ".join(f'"{level} g"' for level in (2.5, 2.75, 3, 3.25, 3.5))
-    scene = re.sub(r'acceleration = "5 g"', f"levels = [{levels}]", scene)
-    sets = {"drive.waveform": "levels", "drive.frequency": f"{frequency} Hz"}
-    found = pf.run(scene, **sets).measures["onset_level"]
-    assert abs(found.value / G_N - onset) <= found.error / G_N + 0.005
 
 
 def test_always_guide_python_example_runs(tmp_path, monkeypatch):
@@ -167,26 +102,24 @@ def test_always_guide_python_example_runs(tmp_path, monkeypatch):
 
 @pytest.fixture
 def run_recipe(tmp_path, monkeypatch):
-    """Return a function that runs the README's recipe for a question and returns its output.
+    """Return a function that goes through a door of the README, given its task, and returns the output.
 
-    The folder contains only the files that the recipes name.
+    The folder contains only the files that the commands name.
     """
     monkeypatch.chdir(tmp_path)
-    lines = re.search(r"## Three recipes\n\n```bash\n(.*?)```", read_page("README.md"), re.S)[
-        1
-    ].splitlines()
+    lines = re.search(r"## Five doors\n.*?```bash\n(.*?)```", read_page("README.md"), re.S)[1]
     commands = {
-        question.strip().partition("?")[0]: command
-        for command, _, question in (line.partition("#") for line in lines)
+        question.strip().partition(":")[0]: command
+        for command, _, question in (line.partition("#") for line in lines.splitlines())
     }
-    assert len(commands) == 3
+    assert len(commands) == 5
     for name in re.findall(r"studies/\S+", " ".join(commands.values())):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
 
-    def run_commands(question: str) -> str:
-        """Run the commands of a recipe and return the output of the last."""
-        for words in commands[question].split("&&"):
+    def run_commands(task: str) -> str:
+        """Run the commands of a door and return the output of the last."""
+        for words in commands[task].split("&&"):
             answer = run_successfully(*shlex.split(words)[1:])
         return answer.out
 
@@ -194,9 +127,11 @@ def run_recipe(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_always_tilt_limit_agrees_on_all_pages(run_recipe):
-    """The recipe of tilts runs, all pages quote its tilt limit, and a run at this limit changes the loop area by 5 %."""
-    verdict = run_recipe("how much tilt may I allow")
+def test_always_tilt_limit_agrees_on_all_pages(tmp_path, monkeypatch):
+    """All pages quote the tilt limit of the sweep, and a run at this limit changes the loop area by 5 %."""
+    monkeypatch.chdir(tmp_path)
+    run_successfully("new", "misalignment", "-o", "tilts.toml")
+    verdict = run_successfully("sweep", "tilts.toml").out
     content = read_json("out/tilts-sweep/sweep.json")
     limits = {limit["measure"]: limit["value"] for limit in content["limits"]}
     motion = set(limits) & {
@@ -225,12 +160,13 @@ def test_always_tilt_limit_agrees_on_all_pages(run_recipe):
     assert at_limit / first - 1 == pytest.approx(-0.05, abs=0.003)
 
 
-def test_always_joint_and_pad_recipes_run(run_recipe):
-    """The recipes of the joint and of the pad run without error.
+def test_always_doors_of_joint_face_and_mesh_run(run_recipe):
+    """The commands for a joint, a worn face and a mesh run without error.
 
     The interval of the worn depth covers the difference of the mean heights.
     """
-    joint = run_recipe("how stiff is my joint, what does it damp")
+    assert "interface nodes" in run_recipe("my mesh")
+    joint = run_recipe("my joint")
     assert all(
         text in joint for text in ("equivalent_stiffness", "loop_area", "dissipated per cycle")
     )
@@ -238,7 +174,7 @@ def test_always_joint_and_pad_recipes_run(run_recipe):
         float,
         re.search(
             r"Worn depth (\S+) nm \((\S+) to (\S+)\), the mean of the lost material over the common length",
-            run_recipe("is my pad worn"),
+            run_recipe("my worn face"),
         ).groups(),
     )
     before, after = (
@@ -252,8 +188,8 @@ def test_always_joint_and_pad_recipes_run(run_recipe):
 
 
 def assert_pages_quote_limit(limit: str, peak: str) -> None:
-    """Assert that README, gallery, notebook and studies quote the same tilt limit and pressure criterion."""
-    rows = read_page("studies/README.md").splitlines()
+    """Assert that answers, notebook and studies quote the same tilt limit and pressure criterion."""
+    rows = read_page("studies/answers.md").splitlines()
     book, tilted, moving = (
         next(row for row in rows if f"({name})" in row)
         for name in ("notebooks/misalignment.ipynb", "rig/tilt.py", "misalignment/in_motion.py")
@@ -266,7 +202,7 @@ def assert_pages_quote_limit(limit: str, peak: str) -> None:
         ast.get_docstring(ast.parse(read_page(f"studies/{path}")))
         for path in ("rig/tilt.py", "misalignment/in_motion.py")
     )
-    for page in (read_page("README.md"), book, tilted, moving, notebook, study, other):
+    for page in (book, tilted, moving, notebook, study, other):
         assert limit in " ".join(page.split()), page[:80]
     for page in (book, notebook, study):
         assert peak in " ".join(page.split()), page[:80]

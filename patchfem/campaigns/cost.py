@@ -3,7 +3,7 @@
 In: a model, and the setting that varies. Out: a list of `Cost`, one per run, and sentences about the
 cheapest setting that meets a tolerance.
 
-Read `compute_setting_costs` first. Times are CPU seconds of this process and its child processes, which are hardly
+Read `compute_costs` first. Times are CPU seconds of this process and its child processes, which are hardly
 affected by other programs.
 """
 
@@ -20,6 +20,7 @@ from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..runs.plan import plan
+from ..runs.refine import is_main
 from ..runs.results.result import Result
 from ..runs.run import run as run_plan
 from .numerical_settings import (
@@ -89,6 +90,40 @@ class Cost:
     def has_error(self, name: str) -> bool:
         """Return whether the measure `name` has an error estimate."""
         return name in self.measures and self.measures[name].error is not None
+
+
+def compute_costs(
+    model: Model, over: str = "", say: Callable | None = None, *, varies_all: bool = False
+) -> dict[str, list[Cost]]:
+    """Run a model with several tolerances, and over its mesh or its steps.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the scene with its own settings.
+    over : str
+        Only setting that varies, one of NUMERICAL_SETTINGS; "" for the tolerance and the first setting of the scene.
+    say : callable, optional
+        Called with a line of text for each run.
+    varies_all : bool
+        Whether every setting of the scene varies besides the tolerance.
+
+    Returns
+    -------
+    dict of str to list of Cost
+        Runs by what varies, from coarse to fine.
+
+    Raises
+    ------
+    PatchfemError, NotConverged
+        As for `compute_setting_costs`.
+    """
+    names = [over]
+    if not over:
+        with locate_errors(model.source):
+            settings = find_applicable_settings(model)
+        names = [TOLERANCE_SETTING, *settings[: None if varies_all else 1]]
+    return {name: compute_setting_costs(model, name, say) for name in names}
 
 
 def compute_setting_costs(
@@ -256,13 +291,19 @@ def find_measures_with_error(runs: list[Cost]) -> list[str]:
     return [name for name in names if any(run.has_error(name) for run in runs)] or names
 
 
+def find_judged_measures(runs: list[Cost]) -> list[str]:
+    """Return the main measures with an error estimate in any run; without such a measure, all with an estimate."""
+    names = find_measures_with_error(runs)
+    return list(filter(is_main, names)) or names
+
+
 def find_coarsest_run(runs: list[Cost], tolerance: float) -> Cost | None:
     """Return the coarsest run within a tolerance; None if there is none.
 
     `runs` are sorted from coarse to fine. A coarse run that is accurate by chance is excluded: all finer values must be
     within the tolerance as well. The automatic setting, which is the last one, is judged independently of the others.
     """
-    names = find_measures_with_error(runs)
+    names = find_judged_measures(runs)
     coarsest = None
     for run in reversed(runs):
         if rate_run(run, names, tolerance).judge(tolerance) is Judgement.MEETS:
@@ -277,7 +318,7 @@ def find_best_run(runs: list[Cost], tolerance: float) -> Cost:
 
     Only a run without unknown errors can have the smallest ones.
     """
-    names = find_measures_with_error(runs)
+    names = find_judged_measures(runs)
     rated = [(rate_run(run, names, tolerance), run) for run in runs]
     known = [(accuracy, run) for accuracy, run in rated if accuracy.is_complete]
     _, best = min(known, key=lambda pair: pair[0], default=rated[-1])
@@ -286,13 +327,15 @@ def find_best_run(runs: list[Cost], tolerance: float) -> Cost:
 
 def describe_best_setting(runs: list[Cost], tolerance: float) -> str:
     """Describe the coarsest setting that meets a tolerance, or the worst measure of the best run if none meets it."""
-    names = find_measures_with_error(runs)
+    names = find_judged_measures(runs)
     best = find_best_run(runs, tolerance)
     worst = rate_run(best, names, tolerance)
     seconds = format_number(best.seconds, 2)
     if find_coarsest_run(runs, tolerance) is not None:
-        estimated = " that has an error estimate" if best.measures.keys() - set(names) else ""
-        return f"{best.words}: {seconds} CPU s per run, with every measure{estimated} within the tolerance {tolerance:g}"
+        judged = (
+            "main measure" if any(map(is_main, names)) else "measure that has an error estimate"
+        )
+        return f"{best.words}: {seconds} CPU s per run, with every {judged} within the tolerance {tolerance:g}"
     if not worst.is_complete:
         return f"no setting is known to meet the tolerance {tolerance:g}: no run has an error estimate of every measure"
     return (

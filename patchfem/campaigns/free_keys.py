@@ -7,6 +7,7 @@ import numpy as np
 from ..core import Outcome, PatchfemError
 from ..model.model import Model, build
 from ..runs.patch import mesh_levels
+from ..runs.patch.press import solve_patch_contact
 from ..scene.assignments import BOUNDS_FORM, Range, read_assignments
 from ..scene.lines import find_scene_value
 from ..scene.overrides import BaseScene
@@ -82,12 +83,16 @@ def parse_ranges(texts: Iterable[str]) -> list[Range]:
     return ranges
 
 
-def solve_contact(model: Model):
+def solve_contact(model: Model, pair=None):
     """Solve the static contact problem of a model without error estimates.
 
-    Raises PatchfemError if the surfaces do not touch.
+    `pair` are its condensed pieces, by default those on a mesh of its own. Raises PatchfemError if the surfaces do not
+    touch.
     """
-    patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+    if pair is None:
+        patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+    else:
+        patch = solve_patch_contact(model.patch, pair)
     if patch.pressure.outcome is Outcome.NO_CONTACT:
         raise PatchfemError(patch.pressure.outcome.sentence, "")
     return patch

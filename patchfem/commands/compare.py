@@ -5,7 +5,6 @@ from typing import Any
 
 from ..campaigns import compare as pressing
 from ..export.surfaces import compare as compared
-from ..export.surfaces import pairs as compared_pairs
 from ..export.surfaces import worn
 from ..scene import describe_removed
 from ..surface.compare.compare import Options
@@ -123,7 +122,7 @@ def _compare_pairs(table: Path, options, output: Output) -> None:
     pairs fail and 2 if all pairs fail.
     """
     with Progress(output.quiet or output.json_) as progress:
-        answer = save(lambda _: compared_pairs.answer_pairs(table, options, progress), output)
+        answer = save(lambda _: compared.answer_pairs(table, options, progress), output)
     rows = answer.details["pairs"]
     failed = [row for row in rows if row["outcome"] == "failed"]
     for row in failed:

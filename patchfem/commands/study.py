@@ -39,8 +39,9 @@ def cost(
     set_: Sets = (),
     output_options: OutputGroup = DEFAULT_OUTPUT,
 ):
-    """Measure how the error of SCENE depends on computing time (CPU seconds): one run for each of several tolerances,
-    or for each value of one accuracy setting. With -v each setting is varied alone, too.
+    """Measure how the error of SCENE depends on computing time (CPU seconds): one run for each of several tolerances, and
+    for each value of the mesh or the steps, whose convergence is shown with its observed order. With -v every setting is
+    varied.
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
@@ -49,17 +50,14 @@ def cost(
     over = numerical_settings.SCENE_KEYS.get(over, over)
     if over and over not in settings:
         raise UsageError(f"cost --over {over}: unknown key; use one of {', '.join(settings)}")
-    names = [over or cost_curves.TOLERANCE_SETTING]
-    if output_options.verbose and not over:
-        names += numerical_settings.find_applicable_settings(scene_model)
     output = output_options.into(f"{scene_model.source.path.stem}-cost")
 
     def measure_costs(_):
         """Run the scene with all settings."""
         report = None if output.quiet else print_message
-        curves = {
-            name: cost_curves.compute_setting_costs(scene_model, name, report) for name in names
-        }
+        curves = cost_curves.compute_costs(
+            scene_model, over, report, varies_all=output_options.verbose
+        )
         return costs.make_answer(curves, scene_model)
 
     save(measure_costs, output)

@@ -90,7 +90,7 @@ class Variable:
     unit : str
         SI unit; "1" for a ratio, "" for strings and codes.
     text : str
-        Description; `long_name` in the netCDF file.
+        Description; `description` in the netCDF file.
     meanings : tuple of str
         Names of the codes 0, 1, ... for a variable that contains codes.
     """
@@ -109,6 +109,47 @@ Quantities = dict[str, Quantity]
 JsonObject = dict[str, Any]
 
 
+class Row(NamedTuple):
+    """Row of a variable in the table of all verbs.
+
+    - dims: its dimensions, separated by spaces. An array with fewer dimensions has the last ones of them.
+    - unit: SI unit, "1" for a ratio, or "" for codes and words.
+    - text: description; "" for the name in words.
+    - places: where the result of a run has the variable, as dotted names of attributes, keys and indices. The first that
+      exists is used.
+    - meanings: names of the codes 0, 1, ... of a variable of codes.
+    """
+
+    dims: str
+    unit: str
+    text: str = ""
+    places: str = ""
+    meanings: tuple[str, ...] = ()
+
+
+def make_column(name: str, values, row: Row) -> Variable:
+    """Return an array as the variable of a row.
+
+    Parameters
+    ----------
+    name : str
+        Name of the variable, whose words describe it if the row has no description.
+    values : array
+        Numbers in SI units, of which a missing one may be None, texts, or codes, which become small integers.
+    row : Row
+        Dimensions, unit and description.
+    """
+    array = np.asarray(values)
+    if row.meanings:
+        array = array.astype(np.int8)
+    elif array.dtype == object:
+        array = array.astype(float)
+    names = row.dims.split()
+    own_dims = tuple(names[len(names) - array.ndim :])
+    text = row.text or name.replace("_", " ")
+    return Variable(own_dims, array, row.unit, text, tuple(row.meanings))
+
+
 def make_columns(dims: str, columns: dict[str, tuple[Any, ...]]) -> Variables:
     """Return variables over the same dimensions.
 
@@ -120,15 +161,9 @@ def make_columns(dims: str, columns: dict[str, tuple[Any, ...]]) -> Variables:
         Name -> (values, unit) or (values, unit, description). A number that is None becomes NaN; without a description it
         is the name in words.
     """
-    names = dims.split()
     variables = {}
-    for name, (values, unit, *text) in columns.items():
-        array = np.asarray(values)
-        if array.dtype == object:
-            array = array.astype(float)
-        description = text[0] if text else name.replace("_", " ")
-        own_dims = tuple(names[len(names) - array.ndim :])
-        variables[name] = Variable(own_dims, array, unit, description)
+    for name, (values, *row) in columns.items():
+        variables[name] = make_column(name, values, Row(dims, *row))
     return variables
 
 
@@ -142,7 +177,7 @@ def encode_texts(dimension: str, texts: list[str], description: str = "") -> Var
     texts : list of str
         Text of each element; a code stands for each different one.
     description : str, optional
-        What the codes are; `long_name` in the netCDF file.
+        What the codes are; `description` in the netCDF file.
     """
     meanings, codes = np.unique(np.asarray(texts, str), return_inverse=True)
     # the smallest signed type that has all codes

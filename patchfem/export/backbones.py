@@ -135,12 +135,11 @@ def _make_quantities(backbone: Backbone) -> Quantities:
             out[f"{name}_at_smallest_amplitude"] = _make_point_quantity(curve, name, 0)
             out[f"{name}_at_largest_amplitude"] = _make_point_quantity(curve, name, -1)
         out["largest_damping"] = _make_point_quantity(curve, "damping", largest)
-        # A parabola through the point and its neighbours has its vertex within half their distances. At an end of the
-        # curve nothing encloses the peak.
-        error = None
-        if 0 < largest < curve.amplitude.size - 1:
-            error = np.diff(curve.amplitude[largest - 1 : largest + 2]).max() / 2
-        out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m", error)
+        # the peak lies between the neighbours of the point; at an end of the curve nothing encloses it
+        near = curve.amplitude[max(largest - 1, 0) : largest + 2]
+        ends = near[[0, -1]] if near.size == 3 else (None, None)
+        amplitude = Quantity(curve.amplitude[largest], "m", None, *ends)
+        out["amplitude_of_largest_damping"] = amplitude
 
     # a missing frequency is shown with its reason, other missing values are left out
     out |= {

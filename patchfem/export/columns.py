@@ -1,7 +1,7 @@
 """Rows of an answer, and from them its CSV files and the tables of its page.
 
 A source names the rows: a dimension of the arrays, a list of objects in the details, or the curves of a backbone. A row is a
-dict: column -> quantity, number or text. CSV files and tables select columns by their heading lines in `charts.table`.
+dict: column -> quantity, number or text. CSV files and tables select columns by their heading lines in rows.toml.
 """
 
 import csv
@@ -12,8 +12,10 @@ import numpy as np
 from ..formatting import format_number
 from . import quantities
 from .answer import Answer, Quantity, Variable
-from .charts.table import CSV_FILES, CSV_UNITS_PER_SI_UNIT, TABLES, Column, CsvFile, parse_columns
+from .rows import CSV_FILES, TABLES, Column, CsvFile, parse_columns
 
+# Number of these units in one SI unit
+CSV_UNITS_PER_SI_UNIT = {"g": 1 / 9.80665, "mil": 1 / 25.4e-6}
 # cells of a column of a CSV file by its heading. A missing cell is None or "".
 Lists = dict[str, list[str | float | None]]
 # cells of a row by column

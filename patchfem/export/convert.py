@@ -10,8 +10,7 @@ from ..core import Missing, PatchfemError
 from . import lab, pieces, store
 from .charts.axes import PICTURE_ENDINGS
 from .fields import grids
-from .fields.blocks import VTK_FIELDS
-from .fields.vtkhdf import VTKHDF_FILE, Frames, find_fields, read_frames
+from .fields.vtkhdf import VTK_FIELDS, VTKHDF_FILE, Frames, find_fields, read_frames
 from .lab import write
 
 SERIES_FORMATS = (".pvd", ".vtkhdf")

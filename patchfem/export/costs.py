@@ -1,8 +1,10 @@
 """The answer of `cost`: numerical error against CPU time, for several tolerances or values of a setting."""
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
+from ..campaigns import convergence
 from ..campaigns.cost import (
     TOLERANCE_SETTING,
     Accuracy,
@@ -10,12 +12,14 @@ from ..campaigns.cost import (
     Judgement,
     describe_best_setting,
     find_best_run,
+    find_judged_measures,
     find_measures_with_error,
     rate_run,
 )
 from ..formatting import format_number
 from ..model.model import Model
 from ..runs.joint import find_source
+from ..runs.refine import is_main
 from . import quantities
 from .answer import (
     Answer,
@@ -28,15 +32,16 @@ from .answer import (
     make_columns,
     to_plain,
 )
+from .rows import make_variables
 from .runs import make_origin
 
-# columns of cost.csv that every run has: attribute -> heading and unit
-COST_FILE_COLUMNS = {
-    "label": ("setting", ""),
-    "seconds": ("seconds", "s"),
-    "wall_seconds": ("wall_seconds", "s"),
-    "timings": ("timings", ""),
-}
+# Tolerances for which a convergence table names the coarsest sufficient setting, by the name of their column
+SUFFICIENT_TOLERANCES = {"for_1_percent": 1e-2, "for_1_permille": 1e-3}
+MINUTE = 60.0  # CPU seconds
+MIN_GROWTH = (
+    1.5  # smallest ratio of two CPU times from which their growth is known; timings scatter less
+)
+MIN_TOLERANCE = 1e-12  # smallest tolerance that a sentence names, near round-off
 # Words for the judgement of the scene as it is.
 SCENE_JUDGEMENT_WORDS = {
     Judgement.MEETS: "meets the tolerance",
@@ -83,13 +88,16 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     knob, runs = next(iter(curves.items()))
     rows = []
     details = {}
+    converged = []
     for one, curve in curves.items():
-        names = find_measures_with_error(curve)
+        names = find_judged_measures(curve)
         knob_rows = [Row(one, run, rate_run(run, names, run.tolerance)) for run in curve]
         rows += knob_rows
         # the runs of a curve of tolerances have no tolerance in common
         sentence = None if one == TOLERANCE_SETTING else describe_best_setting(curve, tolerance)
         details[one] = {"runs": [describe_run(row) for row in knob_rows], "sentence": sentence}
+        if one != TOLERANCE_SETTING:
+            converged += describe_convergence(curve, one)
     main = _find_main_measure(runs)
 
     # the scene as it is, or the run that the sentence names
@@ -101,6 +109,8 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE_SETTING else []
     # each tolerance has its own advice, but only the best value of a setting
     notes = _describe_advice(rows[: len(runs)] if knob == TOLERANCE_SETTING else [row])
+    if model.patch is not None and model.patch.mesh.file is not None:
+        notes.append("The mesh of the file is the same in all runs.")
     texts = [part["sentence"] for part in details.values() if part["sentence"]]
     sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]
     return Answer(
@@ -108,9 +118,9 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         title=model.source.title,
         verdict=tuple(sentences[:4]),
         quantities=_make_quantities(row, main, tolerance),
-        data=_make_data(rows, main),
+        data=_make_data(rows, main) | _make_convergence_data(converged),
         remarks=Remarks(notes=tuple(notes)),
-        details=details,
+        details=details | ({"convergence": converged} if converged else {}),
         origin=make_origin(find_source(model), "cost"),
     )
 
@@ -130,6 +140,43 @@ def describe_run(row: Row) -> JsonObject:
         numbers = {name: getattr(one, part) for name, one in measures.items()}
         content[f"{part}s"] = {name: one for name, one in numbers.items() if one is not None}
     return content
+
+
+def describe_convergence(runs: list[Cost], setting: str) -> list[JsonObject]:
+    """Return a row for each key quantity with an error: its finest value, observed order, and sufficient settings.
+
+    Parameters
+    ----------
+    runs : list of Cost
+        Runs with rising accuracy.
+    setting : str
+        Name of the setting that varies.
+
+    Returns
+    -------
+    list of dict
+        `setting`, `measure`, CPU `seconds` of the runs with a fixed setting and their relative `changes` from the finest,
+        `value`, `unit`, `error` and `text` of the finest run, observed `order`, and for each of SUFFICIENT_TOLERANCES the
+        coarsest sufficient setting with its CPU time, or "none".
+    """
+    known = find_measures_with_error(runs)
+    rows = []
+    for name in quantities.KEY_QUANTITY_NAMES:
+        if name not in known or not all(name in run.measures for run in runs):
+            continue
+        found = convergence.measure_convergence(runs, setting, name)
+        if max(found.changes) < convergence.ROUND_OFF:
+            continue  # the setting has no effect on this measure
+        finest = Quantity(found.finest.value, found.finest.unit, found.finest.error)
+        row = {"setting": setting, "measure": name} | finest.as_json()
+        row |= {"text": quantities.format_quantity(name, finest)}
+        seconds = [run.seconds for run in runs if run.value is not None]
+        row |= {"order": found.order, "changes": found.changes, "seconds": seconds}
+        for column, tolerance in SUFFICIENT_TOLERANCES.items():
+            run = convergence.find_sufficient_run(runs, name, found, tolerance)
+            row[column] = f"{run.label}, {format_number(run.seconds, 2)} CPU s" if run else "none"
+        rows.append(row)
+    return rows
 
 
 def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
@@ -158,7 +205,33 @@ def _describe_scene(row: Row, rows: list[Row]) -> list[str]:
         sentences.append("No run is known to meet its tolerance.")
     else:
         sentences.append("No run meets its tolerance.")
+    sentences += _describe_minute(met)
     return sentences
+
+
+def _describe_minute(runs: list[Cost]) -> list[str]:
+    """Return the sentence that names the tolerance at which a run takes a minute; [] where the runs show no growth.
+
+    `runs` are those that meet their tolerance, from coarse to fine. CPU time is taken as a power of the tolerance.
+    """
+    if not runs:
+        return []
+    last = runs[-1]
+    if last.seconds >= MINUTE:
+        return [f"Tolerance {last.label} takes more than a minute."]
+    earlier = [run for run in runs if run.seconds < last.seconds / MIN_GROWTH]
+    if not earlier:
+        return []
+    power = math.log(last.seconds / earlier[-1].seconds) / math.log(
+        earlier[-1].tolerance / last.tolerance
+    )
+    tolerance = last.tolerance * (MINUTE / last.seconds) ** (-1 / power)
+    if tolerance < MIN_TOLERANCE:
+        return []
+    return [
+        f"If CPU time goes on growing as from tolerance {earlier[-1].label} to {last.label}, a run takes a minute at a "
+        f"tolerance of {format_number(tolerance, 1)}."
+    ]
 
 
 def _describe_advice(rows: list[Row]) -> list[str]:
@@ -182,10 +255,9 @@ def _describe_advice(rows: list[Row]) -> list[str]:
 def _find_main_measure(runs: list[Cost]) -> str:
     """Return the name of the measure that the charts and the verdict show.
 
-    It is the least accurate key quantity in the first and coarsest run; without key quantities, of all measures.
+    It is the least accurate main measure in the first and coarsest run.
     """
-    names = find_measures_with_error(runs)
-    names = [name for name in quantities.KEY_QUANTITY_NAMES if name in names] or names
+    names = find_judged_measures(runs)
     return rate_run(runs[0], names, runs[0].tolerance).name or names[0]
 
 
@@ -214,9 +286,11 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     `rows` are runs with their judgements, and `main` is the name of the main measure.
     """
     runs = [row.run for row in rows]
-    columns = {"knob": ([row.knob for row in rows], "")}
-    for attribute, (name, unit) in COST_FILE_COLUMNS.items():
-        columns[name] = ([getattr(run, attribute) for run in runs], unit)
+    columns = {"knob": [row.knob for row in rows], "setting": [run.label for run in runs]}
+    for name in ("seconds", "wall_seconds", "timings"):
+        columns[name] = [getattr(run, name) for run in runs]
+    data = make_variables("cost", **columns)
+    columns = {}
     units = {name: one.unit for run in runs for name, one in run.measures.items()}
     for name, unit in units.items():
         for heading, part in ((name, "value"), (f"error_{name}", "error")):
@@ -224,14 +298,17 @@ def _make_data(rows: list[Row], main: str) -> Variables:
             columns[heading] = (numbers, unit)
 
     # an exact run has no place on a logarithmic axis
-    columns["largest_error"] = ([row.worst.fraction or None for row in rows], "1")
-    columns["tolerance"] = ([run.tolerance for run in runs], "1")
-    columns["worst_measure"] = ([row.worst.name.replace("_", " ") for row in rows], "")
+    data |= make_columns("run", columns)
+    columns = {
+        "largest_error": [row.worst.fraction or None for row in rows],
+        "tolerance": [run.tolerance for run in runs],
+        "worst_measure": [row.worst.name.replace("_", " ") for row in rows],
+    }
     for name in ("nodes", "steps"):
         counts = [getattr(run, name) for run in runs]
         if any(counts):
-            columns[name] = (counts, "1")
-    data = make_columns("run", columns)
+            columns[name] = counts
+    data |= make_variables("cost", **columns)
     data |= {"main_measure": data[main], "main_measure_error": data[f"error_{main}"]}
 
     # a colour for each varied setting and for runs that miss the tolerance
@@ -239,3 +316,24 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     texts = [f"{row.knob.replace('_', ' ')}: " * has_several + row.judgement for row in rows]
     data["result"] = encode_texts("run", texts)
     return data
+
+
+def _make_convergence_data(converged: list[JsonObject]) -> Variables:
+    """Return the points of the chart of convergence, from the rows of `describe_convergence`; none without rows.
+
+    The chart has the main measures, or all if there are none.
+    """
+    rows = [row for row in converged if is_main(row["measure"])] or converged
+    has_several = len({row["setting"] for row in rows}) > 1
+    points = {"point_seconds": [], "point_change": []}
+    texts = []
+    for row in rows:
+        text = row["measure"] + f" over {row['setting']}" * has_several
+        for seconds, change in zip(row["seconds"], row["changes"], strict=True):
+            if change > 0:
+                points["point_seconds"].append(seconds)
+                points["point_change"].append(change)
+                texts.append(text.replace("_", " "))
+    if not texts:
+        return {}
+    return make_variables("cost", **points) | {"point_measure": encode_texts("point", texts)}

@@ -31,9 +31,9 @@ from .answer import (
     Remarks,
     Variables,
     encode_texts,
-    make_columns,
 )
 from .quantities import format_quantity
+from .rows import make_variables
 from .run_data import SENSOR_UNITS
 from .runs import make_origin
 
@@ -184,7 +184,7 @@ def _collect_pairs(correlation: np.ndarray, names: list[str]) -> Variables:
     values = np.asarray(correlation, float)[first, second]
     order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
     texts = [f"{names[first[k]]}, {names[second[k]]}" for k in order]
-    return make_columns("pair", {"pair": (texts, ""), "correlation": (values[order], "1")})
+    return make_variables("fit", pair=texts, correlation=values[order])
 
 
 def describe_loop_fit(fitted: FittedKeys) -> Parts:
@@ -212,20 +212,20 @@ def describe_loop_fit(fitted: FittedKeys) -> Parts:
 
     # the chart shows the residual along the rows, where a pattern is an error of the model
     columns = {
-        "slide": (loop.displacement, "m"),
-        loop.quantity: (loop.reading, unit),
+        "slide": loop.displacement,
+        loop.quantity: loop.reading,
         "fitted": (fitted.computed, unit),
         "residual": (np.where(held_out, np.nan, fitted.computed - loop.reading), unit),
-        "row": (np.arange(loop.reading.size), "1"),
-        "held": (held_out.astype(np.int8), ""),
+        "row": np.arange(loop.reading.size),
+        "held": held_out.astype(np.int8),
     }
     if loop.time is not None:
-        columns["time"] = (loop.time, "s")
+        columns["time"] = loop.time
     if held_out.any():  # these rows are drawn apart
         columns["held_out"] = (np.where(held_out, loop.reading, np.nan), unit)
     scores |= {name: Quantity(rms, unit) for name, rms in fitted.score_predictions().items()}
     details = {"step_error": comparison.step_error, "steps_between_rows": comparison.steps_per_row}
-    return Parts(residual, scores, make_columns("row", columns), details)
+    return Parts(residual, scores, make_variables("fit", **columns), details)
 
 
 def describe_curve_fit(fitted: FittedKeys) -> Parts:
@@ -234,10 +234,10 @@ def describe_curve_fit(fitted: FittedKeys) -> Parts:
     beyond = comparison.extrapolate(fitted.fit)
 
     # measured and fitted values, and the curve that extends beyond the measured amplitudes
-    columns = {"amplitude": (comparison.amplitude, "m")}
-    curve = {"curve_amplitude": (beyond[0], "m")}
+    columns = {"amplitude": comparison.amplitude}
+    curve = {"curve_amplitude": beyond[0]}
     scores = {}
-    for k, (name, unit) in enumerate(zip(FITTED_NAMES, ("Hz", "1"))):
+    for k, name in enumerate(FITTED_NAMES):
         row = comparison.parts == k
         value = comparison.measured[row]
         distance = fitted.computed[row] - value
@@ -246,14 +246,13 @@ def describe_curve_fit(fitted: FittedKeys) -> Parts:
         rms = np.sqrt(np.mean((distance / value)[is_used] ** 2))
         scores[f"{name}_residual_rms"] = Quantity(rms)
         columns |= {
-            name: (value, unit),
-            f"{name}_error": (errors, unit),
-            f"{name}_fitted": (fitted.computed[row], unit),
-            f"{name}_residual": (distance / errors, "1"),
+            name: value,
+            f"{name}_error": errors,
+            f"{name}_fitted": fitted.computed[row],
+            f"{name}_residual": distance / errors,
         }
-        curve[f"curve_{name}"] = (beyond[k + 1], unit)
-        curve[f"curve_{name}_error"] = (beyond[k + 3], unit)
-    columns["held"] = (fitted.held_out[comparison.parts == 0].astype(np.int8), "")
+        curve |= {f"curve_{name}": beyond[k + 1], f"curve_{name}_error": beyond[k + 3]}
+    columns["held"] = fitted.held_out[comparison.parts == 0].astype(np.int8)
 
     frequency, damping = (f"{100 * score.value:.2g} %" for score in scores.values())
     residual = (
@@ -263,7 +262,7 @@ def describe_curve_fit(fitted: FittedKeys) -> Parts:
     if comparison.is_assumed.any():
         residual += " The errors of the measured values are their scatter around the fit."
     scores |= {name: Quantity(rms) for name, rms in fitted.score_predictions().items()}
-    data = make_columns("row", columns) | make_columns("curve_amplitude", curve)
+    data = make_variables("fit", **columns, **curve)
     # a row of the table has two values
     details = {"method": comparison.method, "rows": is_used.sum(), "held": (~is_used).sum()}
     return Parts(residual, scores, data, details)
@@ -299,24 +298,22 @@ def _collect_rows(fitted: FittedKeys) -> Variables:
     rows = cells.rows
     is_held = np.zeros(len(rows), bool)
     is_held[cells.row[fitted.held_out]] = True
-    columns = {"held": (is_held.astype(np.int8), "")}
-    for name, unit in (("frequency", "Hz"), ("input", "m s-2"), ("flag", "")):
-        columns[name] = ([getattr(row, name) for row in rows], unit)
+    columns = {"held": is_held.astype(np.int8)}
+    for name in ("frequency", "input", "flag"):
+        columns[name] = [getattr(row, name) for row in rows]
 
-    data = {}
-    for name, unit in SENSOR_UNITS.items():
+    lines = {}
+    for name in SENSOR_UNITS:
         # a row without a reading has no computed one
         is_kind = cells.is_acceleration == (name == "acceleration")
         measured, computed = np.full((2, len(rows)), np.nan)
         measured[cells.row[is_kind]] = cells.measured[is_kind]
         computed[cells.row[is_kind]] = fitted.computed[is_kind]
         ratio = computed / np.where(measured > 0, measured, np.nan)
-        columns |= {name: (measured, unit), f"computed_{name}": (computed, unit)}
-        columns[f"{name}_ratio"] = (ratio, "1")
+        columns |= {name: measured, f"computed_{name}": computed, f"{name}_ratio": ratio}
         # ends of the line on which both are equal
         positive = np.concatenate([measured[measured > 0], computed[computed > 0]])
-        ends = [positive.min(), positive.max()] if positive.size else []
-        data |= make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit)})
+        lines[f"equal_{name}"] = [positive.min(), positive.max()] if positive.size else []
 
     # codes by which the charts colour the rows
     uses = []
@@ -325,7 +322,7 @@ def _collect_rows(fitted: FittedKeys) -> Variables:
         uses.append(f"{'held out' if is_held_out else 'fitted'}{unstable}")
     drives = [f"{row.frequency:.6g} Hz" for row in rows]
     codes = {"use": encode_texts("row", uses), "drive": encode_texts("row", drives)}
-    return codes | data | make_columns("row", columns)
+    return codes | make_variables("fit", **lines, **columns)
 
 
 def describe_wear_fit(fitted: FittedKeys) -> Parts:
@@ -333,25 +330,23 @@ def describe_wear_fit(fitted: FittedKeys) -> Parts:
     comparison = fitted.comparison
     depth = comparison.depth
     unit = fitted.keys.ranges[0].unit
-    points = {
-        "coefficient": (fitted.fit.values, unit),
-        "depth": ([depth.value], "m"),
-        "depth_low": ([depth.low], "m"),
-        "depth_high": ([depth.high], "m"),
-    }
 
     # the computed curve is drawn a little beyond the interval of the coefficient
     coefficients, depths = comparison.curve
     is_drawn = coefficients <= CURVE_EXTENSION_RATIO * np.nanmax(fitted.fit.intervals.ends)
-    curve = {
-        "curve_coefficient": (coefficients[is_drawn], unit),
-        "curve_depth": (comparison.factor * depths[is_drawn], "m"),
-    }
+    data = make_variables(
+        "fit",
+        coefficient=(fitted.fit.values, unit),
+        depth=[depth.value],
+        depth_low=[depth.low],
+        depth_high=[depth.high],
+        curve_coefficient=(coefficients[is_drawn], unit),
+        curve_depth=comparison.factor * depths[is_drawn],
+    )
 
     scores = {"fitted_depth": Quantity(fitted.computed[0], "m", comparison.error)}
     text = format_quantity("fitted_depth", scores["fitted_depth"])
     residual = f"The computed depth is {text}; it was measured as {format_length(depth.low)} to {format_length(depth.high)}."
-    data = make_columns("point", points) | make_columns("curve_coefficient", curve)
     measured = comparison.path.name.replace("--to", depth.name)
     details = {"measured": measured, "model_error": comparison.error, "runs": comparison.n_runs}
     return Parts(residual, scores, data, details)

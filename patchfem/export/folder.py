@@ -16,7 +16,7 @@ from ..disk.deferred_signals import defer_signals
 from ..disk.exchange import make_old_folder_path, replace_folder, restore_folder
 from ..disk.lock import FolderLock
 from . import store
-from .charts.table import CSV_FILES
+from .rows import CSV_FILES
 
 # files of all verbs; a folder that contains any other file is never replaced
 FILES_OF_ALL_VERBS = frozenset(

@@ -41,9 +41,12 @@ def make_attributes(answer: Answer) -> Attributes:
     return attributes
 
 
-def make_variable_attributes(variable: Variable) -> Attributes:
-    """Return the attributes of a variable: unit, description, and the names of codes."""
-    attributes = {"long_name": variable.text} if variable.text else {}
+def make_variable_attributes(name: str, variable: Variable) -> Attributes:
+    """Return the attributes of a variable: name in words, description, unit, and the names of codes."""
+    attributes = {}
+    if variable.text:
+        # xarray labels axes with `long_name`, for which a sentence is too long
+        attributes = {"long_name": name.replace("_", " "), "description": variable.text}
     if variable.meanings:
         codes = np.arange(len(variable.meanings), dtype=variable.values.dtype)
         meanings = " ".join(name.replace(" ", "_") for name in variable.meanings)
@@ -95,7 +98,7 @@ def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
     kind = h5py.string_dtype() if has_strings else values.dtype
     stored = file.create_variable(name, variable.dims, kind, **options)
     stored[...] = values.astype(object) if has_strings else values
-    stored.attrs.update(make_variable_attributes(variable))
+    stored.attrs.update(make_variable_attributes(name, variable))
 
 
 def read_netcdf(path: Path) -> tuple[Variables, Attributes]:
@@ -127,11 +130,13 @@ def make_variable(dims: tuple[str, ...], values: np.ndarray, attributes: Mapping
     values : ndarray
         Array as stored, in SI units.
     attributes : mapping
-        Attributes of the array as stored; `units`, `long_name` and `flag_meanings` are read, as far as they exist.
+        Attributes of the array as stored; `units`, `description` and `flag_meanings` are read, as far as they exist. In
+        files of earlier versions `long_name` is the description.
     """
     unit, text, meanings = (
-        str(attributes.get(key, "")) for key in ("units", "long_name", "flag_meanings")
+        str(attributes.get(key, "")) for key in ("units", "description", "flag_meanings")
     )
+    text = text or str(attributes.get("long_name", ""))
     names = tuple(name.replace("_", " ") for name in meanings.split())
     return Variable(dims, values, unit, text, names)
 
@@ -142,7 +147,7 @@ def to_dataset(answer: Answer):
 
     variables = {}
     for name, variable in answer.data.items():
-        variables[name] = (variable.dims, variable.values, make_variable_attributes(variable))
+        variables[name] = (variable.dims, variable.values, make_variable_attributes(name, variable))
     return xr.Dataset(variables, attrs=make_attributes(answer))
 
 

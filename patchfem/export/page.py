@@ -20,9 +20,9 @@ from ..formatting import format_number
 from . import quantities, store
 from .answer import Answers, Quantity
 from .charts import panels, plotly
-from .charts.table import CHARTS
 from .columns import Table, make_tables
 from .quantities import format_quantity
+from .rows import CHARTS
 
 # what a file beside a page is, by its name or its ending
 FILE_DESCRIPTIONS = {

@@ -14,9 +14,8 @@ from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_atomically
 from ..formatting import choose_axis_unit
 from .charts.axes import save_figure
-from .fields.blocks import VTK_FIELDS
 from .fields.film import contact_window, last_frames
-from .fields.vtkhdf import Frames, collect_frames
+from .fields.vtkhdf import VTK_FIELDS, Frames, collect_frames
 
 FILM_ENDINGS = (".gif", ".mp4", ".html")
 # Width and height; with PIXELS_PER_INCH they give even numbers of pixels, which video formats need

@@ -1,6 +1,6 @@
 """Definitions of all quantities, and how their numbers are displayed.
 
-The measures of runs are defined in `response.rows` and `runs.results.patch_rows`; QUANTITIES defines those of the other
+The measures of runs are defined in `response.rows` and `runs.results.patch_rows`; rows.toml defines those of the other
 verbs. KEY_QUANTITY_NAMES lists the quantities that come first: in the tiles of a page, on the screen and in the first
 columns of a table.
 """
@@ -18,6 +18,7 @@ from ..formatting import (
 from ..runs.results import patch_rows
 from . import surface_definitions
 from .answer import Definition, Quantities, Quantity
+from .rows import QUANTITIES
 
 MAX_KEY_QUANTITIES = 10  # largest number of key quantities on a page and on the screen
 # Smallest half-width of an interval relative to its ends that the digits show
@@ -52,109 +53,6 @@ KEY_QUANTITY_NAMES = tuple(
 
 # kinds of answers whose quantities are defined in `surface_definitions`
 SURFACE_ANSWER_KINDS = ("compare", "pairs", "profile")
-QUANTITIES: dict[str, Definition] = {
-    # sweep
-    "peak_height": Definition("1", "largest response over the swept frequency"),
-    "half_power_width": Definition(
-        "Hz", "width of the peak between the frequencies at which it falls to 1/sqrt(2)"
-    ),
-    "limit": Definition(
-        "1",
-        "value of the swept key at which a measure has changed by 5 % (the peak pressure: by 100 %) from the first case, "
-        "with the cases between which it lies",
-    ),
-    # backbone
-    "frequency_at_smallest_amplitude": Definition(
-        "Hz", "frequency of the mode at the smallest amplitude of the recommended curve"
-    ),
-    "frequency_at_largest_amplitude": Definition(
-        "Hz", "frequency of the mode at the largest amplitude of the recommended curve"
-    ),
-    "damping_at_smallest_amplitude": Definition(
-        "1", "damping ratio of structure and friction at the smallest amplitude"
-    ),
-    "damping_at_largest_amplitude": Definition(
-        "1", "damping ratio of structure and friction at the largest amplitude"
-    ),
-    "force_at_smallest_amplitude": Definition(
-        "N", "force at the output that holds the phase resonance at the smallest amplitude"
-    ),
-    "force_at_largest_amplitude": Definition(
-        "N", "force at the output that holds the phase resonance at the largest amplitude"
-    ),
-    "compared_amplitude": Definition(
-        "m", "common amplitude of the curves at which the change of the key has the largest effect"
-    ),
-    "frequency_change": Definition(
-        "Hz", "frequency for the last value of the key minus that for the first value"
-    ),
-    "damping_change": Definition(
-        "1", "damping ratio for the last value of the key minus that for the first value"
-    ),
-    "force_change": Definition(
-        "N", "force at the output for the last value of the key minus that for the first value"
-    ),
-    "largest_damping": Definition(
-        "1", "largest damping ratio among the amplitudes of the recommended curve"
-    ),
-    "amplitude_of_largest_damping": Definition(
-        "m",
-        "amplitude of the curve with the largest damping ratio; the error is half the distance to its neighbours",
-    ),
-    "free_frequency": Definition(
-        "Hz", "frequency of the mode without its contact; a bonded spring is included"
-    ),
-    "stuck_frequency": Definition(
-        "Hz", "frequency of the mode while the contact sticks with its own stiffness"
-    ),
-    "exponent_micro": Definition(
-        "1",
-        "exponent of the energy loss per cycle over the amplitude, from the smallest to the largest amplitude in micro-slip",
-    ),
-    "exponent_gross": Definition(
-        "1",
-        "exponent of the energy loss per cycle over the amplitude, between the two largest ones in gross slip; 1 in theory",
-    ),
-    # fit; of keys of a scene, see FIT_KEY_TEXT
-    "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
-    "residual_fraction": Definition(
-        "1", "root mean square of fitted minus measured values, over the largest measured value"
-    ),
-    "held_out_rms": Definition(
-        "1",
-        "root mean square of predicted minus measured values of the rows held out; of a curve in standard deviations",
-    ),
-    "left_out_rms": Definition(
-        "1",
-        "root mean square of predicted minus measured values, each predicted without its group of rows; of a curve in "
-        "standard deviations",
-    ),
-    "work_measured": Definition("J", "work of the measured force over the fitted rows"),
-    "work_fitted": Definition("J", "work of the fitted force over the fitted rows"),
-    "frequency_residual_rms": Definition(
-        "1", "root mean square of the relative deviation of the fitted frequency"
-    ),
-    "damping_residual_rms": Definition(
-        "1", "root mean square of the relative deviation of the fitted damping ratio"
-    ),
-    "score_fitted": Definition(
-        "1", "root mean square of ln(computed/measured) of the readings that were fitted"
-    ),
-    "score_held_out": Definition(
-        "1", "root mean square of ln(computed/measured) of the readings that were held out"
-    ),
-    "score_left_out": Definition(
-        "1", "root mean square of ln(computed/measured) of each reading in the fit without it"
-    ),
-    "fitted_depth": Definition("m", "worn depth computed with the fitted coefficient"),
-    # cost
-    "cpu_time": Definition("s", "CPU time of the scene as it is, with its error estimates"),
-    "elapsed_time": Definition("s", "elapsed time of the same run"),
-    "largest_error": Definition(
-        "1", "largest numerical error of a measure in this run, relative to its value and floor"
-    ),
-    "tolerance": Definition("1", "tolerance of the scene, its key accuracy.tolerance"),
-}
 FIT_KEY_TEXT = (
     "value of this key of the scene that fits the measurement best, with its 95 % interval"
 )

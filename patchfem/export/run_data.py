@@ -1,6 +1,6 @@
 """Arrays of a run as variables with dimensions, units and descriptions: the content of result.nc.
 
-In: a `Result` of `runs`. Out: {name: Variable}. A row of RUN_VARIABLES says where a Result has an array; a new variable is a
+In: a `Result` of `runs`. Out: {name: Variable}. A row of rows.toml says where a Result has an array; a new variable is a
 new row. What has to be computed or selected first has a function of its own.
 """
 
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,201 +17,31 @@ from ..model import structure as structure_model
 from ..runs.findings import compute_accuracy_curve
 from ..runs.patch import area_motion
 from ..runs.results.result import Result, patch_surface
-from .answer import Quantities, Quantity, Variable, Variables, encode_texts, make_columns
+from .answer import (
+    Quantities,
+    Quantity,
+    Row,
+    Variable,
+    Variables,
+    encode_texts,
+    make_column,
+    make_columns,
+)
+from .rows import VARIABLES, make_variables
 
 # Largest difference of the drive frequencies of a run and of a measured row that belongs to it
 MAX_FREQUENCY_DIFFERENCE_HZ = 0.5
-STATUS_NAMES = ("open", "stick", "slip")  # meanings of the codes of the status of a node
-STICK_STATE_TEXT = "state of the interface"
+RUN_ROWS = VARIABLES["run"]
 # Quantities that the sensors of a rig measure, and their SI units
 SENSOR_UNITS = {"acceleration": "m s-2", "displacement": "m"}
 # Histories of the friction interface, which a linear run has not
 FRICTION_HISTORIES = ("slide", "slide_velocity", "friction_force")
 
 
-class Row(NamedTuple):
-    """Variable of a run.
-
-    - dims: its dimensions. An array with fewer dimensions has the last ones of them.
-    - unit: SI unit, or "" for codes and names.
-    - text: description.
-    - places: where a Result has the variable, as dotted names of attributes, keys and indices. The first that exists is
-      used.
-    """
-
-    dims: str
-    unit: str
-    text: str
-    places: str
-
-
-RUN_VARIABLES = {
-    "time": Row("time", "s", "time", "response.time"),
-    "relative_displacement": Row(
-        "time",
-        "m",
-        "displacement of the output relative to the base",
-        "response.output response.slide",
-    ),
-    "relative_velocity": Row(
-        "time",
-        "m s-1",
-        "velocity of the output relative to the base",
-        "response.output_rate response.rate",
-    ),
-    "absolute_acceleration": Row(
-        "time", "m s-2", "acceleration at the output, base motion included", "response.acceleration"
-    ),
-    "base_acceleration": Row(
-        "time", "m s-2", "acceleration of the base", "response.base_acceleration"
-    ),
-    "interface": Row(
-        "interface",
-        "",
-        "the two masses of the interface; 0 is the base",
-        "plan.model.rig.friction.names",
-    ),
-    "slide": Row(
-        "interface time",
-        "m",
-        "relative displacement of the two surfaces of the interface",
-        "response.extra.slides.T response.slide",
-    ),
-    "slide_velocity": Row(
-        "interface time",
-        "m s-1",
-        "relative velocity of the two surfaces",
-        "response.extra.slide_rates.T",
-    ),
-    "friction_force": Row(
-        "interface time",
-        "N",
-        "resultant friction force, positive when it opposes positive slip",
-        "response.extra.forces.T response.force",
-    ),
-    "yaw_moment": Row(
-        "time",
-        "N m",
-        "moment about +z of the friction on the upper piece, sum of y f_x - x f_y",
-        "response.extra.yaw_moment",
-    ),
-    "friction_work": Row(
-        "time",
-        "J",
-        "work done against friction since the start",
-        "response.ledger.0 response.extra.ledger.0",
-    ),
-    "energy_stored": Row(
-        "time", "J", "elastic energy of the interface", "response.ledger.1 response.extra.ledger.1"
-    ),
-    "energy_dissipated": Row(
-        "time",
-        "J",
-        "energy dissipated by friction since the start",
-        "response.ledger.2 response.extra.ledger.2",
-    ),
-    "energy_created": Row(
-        "time",
-        "J",
-        "energy created since the start by a friction law that is not passive",
-        "response.ledger.3 response.extra.ledger.3",
-    ),
-    "mode": Row("mode", "", "mode or coordinate of the structure", "plan.model.rig.modes.names"),
-    "period": Row("", "s", "period of the drive", "motion.period"),
-    "event_time": Row("event", "s", "time of the event", "motion.events.time"),
-    "event_interface": Row(
-        "event",
-        "1",
-        "number of the interface or band from 1; 0 for a change of the drive",
-        "motion.events.interface",
-    ),
-    "event_kind": Row(
-        "event", "", "kind of event; `up` means towards positive slip", "motion.events.kind"
-    ),
-    "event_slide": Row("event", "m", "relative displacement at the event", "motion.events.slide"),
-    "curve_frequency": Row("curve_point", "Hz", "drive frequency", "motion.steady.curve.frequency"),
-    "curve_level": Row(
-        "curve_point",
-        "m s-2",
-        "drive: acceleration of the base, or force divided by the modal mass",
-        "motion.steady.curve.level",
-    ),
-    "curve_amplitude": Row(
-        "curve_point",
-        "m",
-        "half the peak-to-peak motion at the output",
-        "motion.steady.curve.amplitude",
-    ),
-    "curve_acceleration_peak": Row(
-        "curve_point",
-        "m s-2",
-        "largest absolute acceleration",
-        "motion.steady.curve.acceleration_peak",
-    ),
-    "curve_acceleration_fundamental": Row(
-        "curve_point",
-        "m s-2",
-        "first harmonic of the absolute acceleration",
-        "motion.steady.curve.acceleration_fundamental",
-    ),
-    "curve_acceleration_distortion": Row(
-        "curve_point",
-        "1",
-        "third over first harmonic of the absolute acceleration",
-        "motion.steady.curve.acceleration_distortion",
-    ),
-    "curve_multiplier": Row(
-        "curve_point",
-        "1",
-        "largest Floquet multiplier; missing under laws of many elements",
-        "motion.steady.curve.multiplier",
-    ),
-    "decay_time": Row(
-        "decay_time", "s", "time at the middle of the evaluated cycle", "motion.decay.time"
-    ),
-    "decay_amplitude": Row(
-        "decay_time", "m", "half the peak-to-peak motion of the output", "motion.decay.amplitude"
-    ),
-    "decay_frequency": Row("decay_time", "Hz", "frequency of the decay", "motion.decay.frequency"),
-    "decay_damping": Row("decay_time", "1", "damping ratio of the decay", "motion.decay.damping"),
-    "frequency": Row("frequency", "Hz", "frequency", "motion.spectra.frequency"),
-    "base_acceleration_spectrum": Row(
-        "frequency",
-        "m2 s-3",
-        "one-sided spectral density of the base acceleration",
-        "motion.spectra.drive",
-    ),
-    "relative_displacement_spectrum": Row(
-        "frequency",
-        "m2 Hz-1",
-        "one-sided spectral density of the output",
-        "motion.spectra.displacement",
-    ),
-    "absolute_acceleration_spectrum": Row(
-        "frequency",
-        "m2 s-3",
-        "one-sided spectral density of the acceleration at the output",
-        "motion.spectra.acceleration",
-    ),
-    "coherence": Row("frequency", "1", "coherence of drive and output", "motion.spectra.coherence"),
-    "gain_peak": Row("", "Hz", "frequency of the peak of H1", "measures.response_frequency.value"),
-    "wear_cycle": Row("wear_cycle", "1", "cycles of wear so far", "wear.columns.cycle"),
-}
-# fields along the interface, by their names in `Result.fields`
-INTERFACE_FIELDS = {
-    "normal_stress": ("Pa", "normal stress at the nodes, compression positive"),
-    "shear_stress": ("Pa", "frictional shear stress, positive when it opposes positive slip"),
-    "gap": ("m", "gap that remains between the loaded surfaces"),
-    "slip": ("m", "irreversible local slip"),
-    "status": ("", "contact status; FILES.md defines slip"),
-    "worn_depth": ("m", "worn depth, sum of both pieces"),
-}
-
-
 def collect_data(result: Result) -> Variables:
     """Return all arrays of a run, in SI units."""
     data = {}
-    for name, row in RUN_VARIABLES.items():
+    for name, row in RUN_ROWS.items():
         places = " ".join(f"{place}_error" for place in row.places.split())
         error = Row(row.dims, row.unit, f"error of {name}", places)
         data |= _read_row(result, name, row) | _read_row(result, f"{name}_error", error)
@@ -229,20 +58,18 @@ def collect_data(result: Result) -> Variables:
 def _read_row(result: Result, name: str, row: Row) -> Variables:
     """Return the variable of a row by its name, with values from a run, or {} if the run has no such values.
 
-    Codes become small integers, and names become strings. `row` has the places of the values in the run, with dimensions
+    Names become strings. `row` has the places of the values in the run, with dimensions
     and unit.
     """
     found = (_look_up(result, place) for place in row.places.split())
     values = next((one for one in found if one is not None), None)
     if values is None or not np.size(values):
         return {}
-    meanings = _list_code_meanings(name)
-    if meanings:
-        values = np.asarray(values, np.int8)
-    elif row.unit == "":
+    if name == "event_kind":
+        row = row._replace(meanings=response.events.EVENT_KIND_NAMES)
+    if row.unit == "" and not row.meanings:
         values = np.array([str(value) for value in values])
-    variables = make_columns(row.dims, {name: (values, row.unit, row.text)})
-    return {name: replace(variables[name], meanings=meanings)}
+    return {name: make_column(name, values, row)}
 
 
 def _look_up(value, place: str):
@@ -275,8 +102,7 @@ def _collect_motion(result: Result) -> Variables:
         # the coordinates of a rig of masses are the motions of its masses
         rig = result.plan.model.rig
         motions = structure_model.compute_named_motions(rig.modes, response.modal)
-        columns = {"modal_coordinate": (motions, "m", "modal coordinate")}
-        data = make_columns("time mode", columns)
+        data = make_variables("run", modal_coordinate=motions)
         if result.plan.kind != "rig":
             return data
 
@@ -287,8 +113,7 @@ def _collect_motion(result: Result) -> Variables:
             constant = np.full(count, result.measures["normal_load"].value)
             loads = response.extra.get("normal_load", constant)
 
-    columns = {"normal_load": (loads, "N", "normal load on the interface")}
-    return data | make_columns("interface time", columns)
+    return data | make_variables("run", normal_load=loads)
 
 
 def _collect_loop(result: Result) -> Variables:
@@ -317,11 +142,8 @@ def _collect_loop(result: Result) -> Variables:
         before = np.flatnonzero(np.diff(np.sign(force)))
         slide = np.insert(slide, before + 1, slide[before])
         force = np.insert(force, before + 1, force[before + 1])
-    columns = {
-        "loop_slide": (slide, "m", "slide of the interface in the last cycle"),
-        "loop_friction_force": (force, "N", "friction force in the last cycle"),
-    }
-    return make_columns("interface loop_point", columns) | _collect_measured_loop(result)
+    loop = make_variables("run", loop_slide=slide, loop_friction_force=force)
+    return loop | _collect_measured_loop(result)
 
 
 def _collect_measured_loop(result: Result) -> Variables:
@@ -339,11 +161,9 @@ def _collect_measured_loop(result: Result) -> Variables:
     load = 1.0
     if loop.quantity != "force":
         load = np.interp(loop.time, result.response.time, result.response.load)
-    columns = {
-        "measured_slide": (loop.displacement, "m", "measured slide"),
-        "measured_force": (loop.reading * load, "N", "measured friction force"),
-    }
-    return make_columns("measured_sample", columns)
+    return make_variables(
+        "run", measured_slide=loop.displacement, measured_force=loop.reading * load
+    )
 
 
 def _collect_patch(result: Result) -> Variables:
@@ -359,13 +179,12 @@ def _collect_patch(result: Result) -> Variables:
     if result.wear is not None:
         count = result.wear.n_frames
         cycles = fields["time"][: count + 1] / result.wear.period
-        data = make_columns("wear_frame", {"wear_frame": (cycles, "1", "cycles")})
+        data = make_variables("run", wear_frame=cycles)
         for name in ("normal_stress", "worn_depth"):
             data[f"wear_{name}"] = _make_field(name, fields[name][: count + 1], "wear_frame")
         fields = {name: values[count:] for name, values in fields.items()}
         fields["time"] = fields["time"] - fields["time"][0]
-    text = "gap of the unloaded surfaces, wear included"
-    data |= make_columns("x", {"unloaded_gap": (surface.unloaded_gap, "m", text)})
+    data |= make_variables("run", unloaded_gap=surface.unloaded_gap)
     data |= _collect_frames(fields, surface)
     if result.patch.model.area is None:
         return data
@@ -377,11 +196,9 @@ def _collect_reversal(result: Result) -> Variables:
     reversal = area_motion.find_face_reversal(result, result.patch)
     if reversal is None:
         return {}
-    text = "contact status at the last reversal of the slide"
-    status = Variable(("x",), reversal.status, "", text, STATUS_NAMES)
-    slip_text = "path of the slip of each cell in a cycle"
-    slip = Variable(("x",), reversal.slip_per_cycle, "m", slip_text)
-    return {"reversal_status": status, "slip_per_cycle": slip}
+    return make_variables(
+        "run", reversal_status=reversal.status, slip_per_cycle=reversal.slip_per_cycle
+    )
 
 
 def _spread_over_face(data: Variables, patch) -> Variables:
@@ -411,34 +228,21 @@ def _collect_frames(fields: dict[str, np.ndarray], surface, frame: str = "frame"
     `fields` are those of all frames by name, `surface` has the nodes of the interface, and `frame` is the name of the
     dimension of the frames.
     """
-    area = "area of the interface that belongs to a node, summed over all pairs of pieces"
-    nodes = {
-        "x": (surface.x, "m", "position along the sliding direction"),
-        "weight": (surface.weight, "m2", area),
-    }
-    data = make_columns("x", nodes)
+    data = make_variables("run", x=surface.x, weight=surface.weight)
     data |= make_columns(frame, {f"{frame}_time": (fields["time"], "s", "time of the frame")})
-    for name in INTERFACE_FIELDS:
-        if name in fields:
+    for name, row in RUN_ROWS.items():
+        if row.dims == "frame x" and name in fields:
             data[name] = _make_field(name, fields[name], frame)
     return data
-
-
-def _list_code_meanings(name: str) -> tuple[str, ...]:
-    """Return the meaning of each code of a variable of codes; () for other variables."""
-    if name == "status":
-        return STATUS_NAMES
-    return response.events.EVENT_KIND_NAMES if name == "event_kind" else ()
 
 
 def _make_field(name: str, values, frame: str) -> Variable:
     """Return a field along x over frames.
 
-    The `values` are in SI units. `name` is a key of `INTERFACE_FIELDS`, and `frame` the name of the dimension of the
+    The `values` are in SI units. `name` is that of a row over "frame x", and `frame` the name of the dimension of the
     frames.
     """
-    unit, text = INTERFACE_FIELDS[name]
-    return Variable((frame, "x"), np.asarray(values), unit, text, _list_code_meanings(name))
+    return make_column(name, values, RUN_ROWS[name]._replace(dims=f"{frame} x"))
 
 
 def _collect_face(face) -> Variables:
@@ -463,10 +267,10 @@ def _collect_levels(result: Result) -> Variables:
         return {}
     unit = levels[0].unit
     drive_text = "force" if unit == "N" else "acceleration of the base"
-    columns = {
-        "level_drive": ([level.drive for level in levels], unit, drive_text),
-        "level_stuck": (np.array([level.stuck for level in levels], np.int8), "", STICK_STATE_TEXT),
-    }
+    columns = {"level_drive": ([level.drive for level in levels], unit, drive_text)}
+    data = make_columns("level", columns)
+    data |= make_variables("run", level_stuck=[level.stuck for level in levels])
+    columns = {}
     table = response.rows.MOTION_TABLE
     for name in response.events.LEVEL_MEASURES:
         if any(name in level.values for level in levels):
@@ -475,9 +279,7 @@ def _collect_levels(result: Result) -> Variables:
             errors = [level.errors.get(name, np.nan) for level in levels]
             columns[f"level_{name}"] = (values, unit, table[name].text)
             columns[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
-    data = make_columns("level", columns)
-    data["level_stuck"] = replace(data["level_stuck"], meanings=("slips", "sticks"))
-    return data
+    return data | make_columns("level", columns)
 
 
 def _collect_regimes(result: Result) -> Variables:
@@ -488,8 +290,8 @@ def _collect_regimes(result: Result) -> Variables:
     regimes = encode_texts("curve_point", curve["regime"], "regime of the steady motion")
     folds = np.asarray(curve.get("folds", ()), float)
     unit = "Hz" if np.ptp(curve["frequency"]) > 0 else "m s-2"
-    columns = {"curve_fold": (folds, unit, "where the curve turns back")} if folds.size else {}
-    return {"curve_regime": regimes} | make_columns("fold", columns)
+    columns = {"curve_fold": (folds, unit)} if folds.size else {}
+    return {"curve_regime": regimes} | make_variables("run", **columns)
 
 
 def _collect_frequency_response(result: Result) -> Variables:
@@ -497,12 +299,7 @@ def _collect_frequency_response(result: Result) -> Variables:
     if result.motion.spectra is None:
         return {}
     gain = np.asarray(result.motion.spectra.gain)
-    text = "of H1, displacement of the output over base acceleration"
-    columns = {
-        "gain": (np.abs(gain), "s2", f"magnitude {text}"),
-        "phase": (np.angle(gain), "rad", f"phase {text}"),
-    }
-    return make_columns("frequency", columns)
+    return make_variables("run", gain=np.abs(gain), phase=np.angle(gain))
 
 
 def _collect_wear(result: Result) -> Variables:
@@ -523,20 +320,16 @@ def _collect_readings(result: Result) -> Variables:
     if readings is None:
         return {}
     rows, computed = readings
-    measured_columns = {"measured_input": ([row.input for row in rows], "m s-2", "input")}
     level = structure.drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
-    text = "largest acceleration of the drive"
-    columns = {"computed_input": ([float(level)], "m s-2", text)}
-    for name, unit in SENSOR_UNITS.items():
-        values = [getattr(row, name) for row in rows]
-        measured_columns[f"measured_{name}"] = (np.array(values, float), unit, f"measured {name}")
+    measured = {"measured_input": [row.input for row in rows]}
+    columns = {"computed_input": [float(level)]}
+    for name in SENSOR_UNITS:
+        measured[f"measured_{name}"] = [getattr(row, name) for row in rows]
         if name in computed:
-            one = computed[name]
-            text = f"{name} that the sensor would indicate"
-            columns[f"computed_{name}"] = ([one.value], unit, text)
-            if one.error is not None:
-                columns[f"computed_{name}_error"] = ([one.error], unit, f"error of computed_{name}")
-    return make_columns("measured_row", measured_columns) | make_columns("computed", columns)
+            columns[f"computed_{name}"] = [computed[name].value]
+            if computed[name].error is not None:
+                columns[f"computed_{name}_error"] = [computed[name].error]
+    return make_variables("run", **measured, **columns)
 
 
 def find_readings(result: Result) -> tuple[list[inputs.measured.MeasuredRow], Quantities] | None:
@@ -581,10 +374,9 @@ def _collect_accuracy(result: Result) -> Variables:
     runs = compute_accuracy_curve(result)
     if not runs:
         return {}
-    text = "largest error of the main measures, as the tolerance that it meets"
-    columns = {
-        "accuracy_steps": ([run.steps for run in runs], "1", "steps per cycle"),
-        "accuracy_seconds": ([run.seconds for run in runs], "s", "CPU time of the motion"),
-        "accuracy_error": ([run.error for run in runs], "1", text),
-    }
-    return make_columns("accuracy_run", columns)
+    return make_variables(
+        "run",
+        accuracy_steps=[run.steps for run in runs],
+        accuracy_seconds=[run.seconds for run in runs],
+        accuracy_error=[run.error for run in runs],
+    )

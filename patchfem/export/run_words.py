@@ -22,6 +22,7 @@ from ..runs.results.patch_rows import find_unknown_measures
 from ..runs.results.result import Result
 from . import quantities
 from .answer import JsonObject, Quantities, Quantity
+from .rows import HEADLINES
 from .run_data import SENSOR_UNITS, find_readings
 
 RUN_CHECK_MEASURES = ("energy_balance", "work_check")  # measures that only check a run
@@ -41,36 +42,6 @@ SCATTER_NAME_ENDING = "_scatter"
 MAX_INPUT_DIFFERENCE = 0.01
 CYCLE_ROUND_OFF = 1e-6  # largest part of a cycle that is missing through round-off
 
-# parts of a headline: (measure, text); a run shows the first MAX_HEADLINE_PARTS that it has
-HEADLINE_PARTS = {
-    "wear": (
-        ("worn_depth_max", "{} worn off at the deepest place"),
-        ("worn_volume", "{} worn off"),
-        ("contact_fraction", "{} of the length in contact"),
-    ),
-    "random": (
-        ("relative_displacement_rms", "the output moves {} rms"),
-        ("response_frequency", "H1 peaks at {}"),
-        ("response_damping", "its damping ratio is {}"),
-        ("friction_power", "friction dissipates {}"),
-    ),
-    "rig": (
-        ("relative_displacement_amplitude", "displacement amplitude at the output {}"),
-        ("absolute_acceleration_peak", "peak acceleration {}"),
-        ("loop_area", "{} dissipated per cycle"),
-    ),
-    "bench": (
-        ("friction_ratio_peak", "friction ratio peaks at {}"),
-        ("equivalent_stiffness", "equivalent stiffness {}"),
-        ("loop_area", "{} dissipated per cycle"),
-        ("slip_amplitude", "slip amplitude {}"),
-    ),
-    "patch": (
-        ("contact_fraction", "{} of the length in contact"),
-        ("pressure_peak", "peak pressure {}"),
-        ("approach", "approach {}"),
-    ),
-}
 MAX_HEADLINE_PARTS = 3  # largest number of measures in a headline
 
 
@@ -105,7 +76,7 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
     """
     kind = _choose_headline(result, measures)
     parts = []
-    for name, text in HEADLINE_PARTS[kind]:
+    for name, text in HEADLINES[kind].items():
         if name == "loop_area":
             parts += _describe_interfaces(result, measures, text)
         elif _is_nonzero(measures, name):
@@ -153,7 +124,7 @@ def _describe_onset(result: Result, measures: Quantities) -> str:
 
 
 def _choose_headline(result: Result, measures: Quantities) -> str:
-    """Return which row of HEADLINE_PARTS lists the measures of the headline of a run, such as "rig" or "wear"."""
+    """Return which table of HEADLINES lists the measures of the headline of a run, such as "rig" or "wear"."""
     if "worn_volume" in measures or "worn_depth_max" in measures:
         return "wear"
     if "relative_displacement_rms" in measures:

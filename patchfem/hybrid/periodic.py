@@ -3,6 +3,7 @@
 The unknowns are the modes, the states of the laws, and those reversal points of the laws that the period moves.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,14 +12,16 @@ import numpy as np
 from .. import compiled
 from ..core import NotConverged
 from .cases import Case, make_arrays
-from .laws import LAWS, masing
+from .laws import LAWS, masing, mirror_state
 from .records import (
     N_FACE_INTEGRALS,
     N_INTEGRALS,
     Clock,
     Cycle,
     Face,
+    LawNumbers,
     Memory,
+    Record,
     Setting,
     State,
     Status,
@@ -110,6 +113,7 @@ def find_periodic_motion(
     start: State | None = None,
     has_kinks: bool = False,
     is_undamped: bool = False,
+    odd_laws: Sequence[LawNumbers] = (),
 ) -> PeriodicMotion:
     """Find the periodic motion that follows some first cycles of a case.
 
@@ -127,6 +131,8 @@ def find_periodic_motion(
     is_undamped : bool
         Whether a free motion without friction does not decay. A motion from rest that grows for ever is then found first,
         because the periods of a growing motion would lead nowhere.
+    odd_laws : sequence of LawNumbers
+        Laws of a rig whose motions are symmetric, see `Shooting`.
 
     Raises
     ------
@@ -134,7 +140,7 @@ def find_periodic_motion(
         If the search needs too many steps.
     """
     growth = _measure_growth(case) if is_undamped and start is None else None
-    shooting = Shooting(case)
+    shooting = Shooting(case, odd_laws)
     if start is not None:
         shooting.state = start
     if growth is None or not growth.size:
@@ -197,7 +203,7 @@ def _search(
             error = shooting.find_multipliers(nearer)[1]
 
     # The measures are those of a period from there on.
-    run = run_case(shooting.case, start=before)
+    run = run_case(shooting.whole, start=before)
     return PeriodicMotion(
         run,
         change,
@@ -209,7 +215,9 @@ def _search(
     )
 
 
-def follow_periodic_motion(case: Case, near: PeriodicMotion) -> PeriodicMotion:
+def follow_periodic_motion(
+    case: Case, near: PeriodicMotion, odd_laws: Sequence[LawNumbers] = ()
+) -> PeriodicMotion:
     """Find the periodic motion of a case from that of a similar case, without its stability and the error of its state.
 
     The derivatives of the similar motion serve as long as the corrections with them converge, so that the motion after a
@@ -221,6 +229,8 @@ def follow_periodic_motion(case: Case, near: PeriodicMotion) -> PeriodicMotion:
         Its start and schedule are not used.
     near : PeriodicMotion
         Motion of a similar case, in which no motion grows for ever.
+    odd_laws : sequence of LawNumbers
+        Laws of a rig whose motions are symmetric, see `Shooting`.
 
     Returns
     -------
@@ -228,7 +238,7 @@ def follow_periodic_motion(case: Case, near: PeriodicMotion) -> PeriodicMotion:
         A change of MAX_KINKED_CHANGE over its period counts as none, because an interface that hardly slips comes to rest
         only after hundreds of periods. It is larger if the similar motion is too far away.
     """
-    shooting = _FollowedShooting(case)
+    shooting = _FollowedShooting(case, odd_laws)
     shooting.state = near.run.final
     shooting.map = near.map
     shooting.relax(1)
@@ -239,7 +249,7 @@ def follow_periodic_motion(case: Case, near: PeriodicMotion) -> PeriodicMotion:
     if shooting.serves(before):
         shooting.correct(before)
         nearer = shooting.state
-        run = run_case(shooting.case, start=nearer)
+        run = run_case(shooting.whole, start=nearer)
         shooting.state = run.final
         nearer_change = shooting.measure_change(nearer)
         if nearer_change < change and shooting.has_same_regime(nearer):
@@ -247,7 +257,7 @@ def follow_periodic_motion(case: Case, near: PeriodicMotion) -> PeriodicMotion:
         else:
             run = None
     return PeriodicMotion(
-        run or run_case(shooting.case, start=before),
+        run or run_case(shooting.whole, start=before),
         change,
         np.inf,
         MAX_KINKED_CHANGE,
@@ -255,6 +265,30 @@ def follow_periodic_motion(case: Case, near: PeriodicMotion) -> PeriodicMotion:
         shooting.n_periods,
         map=shooting.map,
     )
+
+
+def interpolate_motions(
+    first: PeriodicMotion, second: PeriodicMotion, fraction: float
+) -> PeriodicMotion:
+    """Return the start of a motion between two others by linear interpolation; the nearer one if their regimes differ.
+
+    Parameters
+    ----------
+    first, second : PeriodicMotion
+        Motions of similar cases, of which the nearer one has the regimes, the history and the derivatives.
+    fraction : float
+        Place between both, 0 at the first one.
+    """
+    near, far = (first, second) if fraction < 0.5 else (second, first)
+    state = near.run.final
+    other = far.run.final
+    if not np.array_equal(state.memory[:, FOLLOWED_MEMORY], other.memory[:, FOLLOWED_MEMORY]):
+        return near
+    weight = min(fraction, 1 - fraction)
+    memory = state.memory.copy()
+    memory[:, Memory.STACK :] += weight * (other.memory - state.memory)[:, Memory.STACK :]
+    between = state._replace(y=state.y + weight * (other.y - state.y), memory=memory)
+    return near._replace(run=replace(near.run, final=between))
 
 
 class _Growth(NamedTuple):
@@ -286,17 +320,33 @@ class Shooting:
 
     The periods of a search are not measured, which takes more than half of the time of a period; a class whose map needs
     the measures of a period sets `measures_periods`.
+
+    Parameters
+    ----------
+    case : Case
+        Rig, and the state from which the search begins.
+    odd_laws : sequence of LawNumbers
+        Laws of all interfaces, if the second half of a periodic motion is the first one with the opposite sign. The map is
+        then that of half a period, whose end is given the opposite sign.
     """
 
     measures_periods = False
 
-    def __init__(self, case: Case):
+    def __init__(self, case: Case, odd_laws: Sequence[LawNumbers] = ()):
         settings = case.rig.settings
         self.period = float(settings[Setting.PERIOD])
-        self.case = replace(
+        self.odd_laws = odd_laws
+        self.whole = replace(
             case, ends=np.array([self.period]), windows=np.zeros(1), samples=np.zeros(0)
         )
+        end = self.period / 2 if odd_laws else self.period
+        self.case = replace(self.whole, ends=np.array([end]))
         self.state = make_arrays(case)[0]
+        # The same arrays serve for all periods, because a call with known arrays is shorter.
+        self.work, self.record = make_arrays(self.case)
+        if not self.measures_periods:
+            self.record.cycles[:, Cycle.WINDOW] = -1.0
+        self.blank = Record(*(array.copy() for array in self.record))
         self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
         self.n_periods = 0
         self.n_steps = 0.0
@@ -322,14 +372,14 @@ class Shooting:
         NotConverged
             If all periods of the search take more than `Setting.MAX_STEPS` steps.
         """
-        state = copy_state(state)
         settings = self.case.rig.settings
+        for target, source in zip((*self.work, *self.record), (*state, *self.blank)):
+            target[...] = source
+        self.record.cycles[:, Cycle.END] = self.case.ends
+        state = self.work
         state.clock[:] = 0.0
         state.clock[Clock.STEP] = 0.1 * settings[Setting.LONGEST_STEP]
         state.clock[Clock.N_STEPS] = self.n_steps
-        self.record = make_arrays(self.case)[1]
-        if not self.measures_periods:
-            self.record.cycles[:, Cycle.WINDOW] = -1.0
         compiled.load_compiled_module("hybrid.engine_kernels").run_case(
             self.case.rig, state, self.record
         )
@@ -340,7 +390,9 @@ class Shooting:
             raise NotConverged(
                 f'no periodic motion was found: {cause}, or accuracy.method = "auto"'
             )
-        return state
+        if self.odd_laws:
+            mirror_state(state, self.case.rig.modes.shape[1], self.odd_laws)
+        return copy_state(state)
 
     def relax(self, count: int) -> None:
         """Advance the motion by some periods."""
@@ -527,7 +579,10 @@ class Shooting:
             return np.full(change.size, np.nan), np.inf
         # A state that nothing determines, such as that of an interface at rest, has no error.
         step = _solve_newton(found, change, NEUTRAL_TOL)
-        return np.linalg.eigvals(found.slopes), float(np.abs(step).max(initial=0.0))
+        multipliers = np.linalg.eigvals(found.slopes)
+        if self.odd_laws:
+            multipliers = multipliers**2
+        return multipliers, float(np.abs(step).max(initial=0.0))
 
     def correct(self, before: State) -> None:
         """Replace the state by a Newton step from another one, which a period takes to it.

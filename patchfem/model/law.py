@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from .. import friction
 from ..core import PatchfemError
-from ..effects import import_effect, law_takes_stiffness_or_length
+from ..effects import import_effect
 from . import patch as patch_models
 from .source import name_key
 
@@ -24,7 +22,6 @@ if TYPE_CHECKING:
 
 # Default rest speed of bonds (2.10) as a fraction of the peak speed.
 REST_SPEED_FRACTION = 1e-3
-BOND_LENGTH_LOAD = 1.0  # load [N] at which an unloaded law with a stiffness takes its bond length
 
 
 class FrictionLimits(NamedTuple):
@@ -40,8 +37,8 @@ class InterfaceLaw:
 
     - key: key of its table, for messages.
     - numbers: effective keys of the law.
-    - load: normal load [N] of an interface between masses; None if the patch or the point of the
-      model carries it.
+    - load: normal load [N] of an interface between masses, an estimate until a patch with a prescribed approach is
+      pressed; None if the patch or the point of the model carries it.
     - patch: patch that carries `load`; None for a point.
     """
 
@@ -62,11 +59,11 @@ class InterfaceLaw:
         return FrictionLimits(law.static * load, kinetic * load)
 
 
-def make_effective_law(law: Friction, width: float | None, load: float | None = None) -> Friction:
+def make_effective_law(law: Friction, width: float | None) -> Friction:
     """Return the keys of a friction law after applying the effects that change its parameters.
 
     `rest_growth` and `slip_growth` are taken at the surface temperature; `static` and `kinetic` are
-    multiplied by the factor of the pad; `bond_length` follows from a stiffness.
+    multiplied by the factor of the pad.
 
     Parameters
     ----------
@@ -74,8 +71,6 @@ def make_effective_law(law: Friction, width: float | None, load: float | None = 
         Keys of the friction law.
     width : float or None
         Width [m] of the contact across the path.
-    load : float, optional
-        Normal load [N].
 
     Returns
     -------
@@ -87,7 +82,7 @@ def make_effective_law(law: Friction, width: float | None, load: float | None = 
         If a rate of growth leaves the range of floating-point numbers.
     """
     if law.temperature is None and law.spread is None:
-        return complete_bond_length(law, load)
+        return law
     changes = {"temperature": None, "spread": None}
     if law.temperature is not None and law.rest_growth is not None:
         rest_growth, slip_growth = _scale_growth_rates(law)
@@ -96,7 +91,7 @@ def make_effective_law(law: Friction, width: float | None, load: float | None = 
         factor = friction.bonds.spread.carried_fraction(width, law.spread)
         changes["static"] = law.static * factor
         changes["kinetic"] = None if law.kinetic is None else law.kinetic * factor
-    return complete_bond_length(law.model_copy(update=changes), load)
+    return law.model_copy(update=changes)
 
 
 def _scale_growth_rates(law: Friction) -> tuple[float, float]:
@@ -111,18 +106,6 @@ def _scale_growth_rates(law: Friction) -> tuple[float, float]:
             heat.rest_activation,
             heat.slip_activation,
         )
-
-
-def complete_bond_length(law: Friction, load) -> Friction:
-    """Return the keys of a law, with the bond length [m] computed from a given stiffness.
-
-    Numbers of the law and the load [N] may be columns.
-    """
-    if law.stiffness is None or not law_takes_stiffness_or_length(law.law):
-        return law
-    if np.ndim(load) == 0:
-        load = load or BOND_LENGTH_LOAD
-    return law.model_copy(update={"bond_length": law.static * load / law.stiffness})
 
 
 def make_bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float = 0.0):
@@ -175,18 +158,22 @@ def build_interface_laws(scene: Scene) -> tuple[InterfaceLaw, ...]:
         return tuple(_build_interface(scene, number) for number in range(len(tables)))
     if scene.friction is None:
         return ()
-    law = make_effective_law(scene.friction, find_pad_width(scene), find_normal_load(scene))
+    law = make_effective_law(scene.friction, find_pad_width(scene))
     return (InterfaceLaw("friction", law, None),)
 
 
 def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
     """Build the interface that table `number`, from 0, of [[structure.interface]] in a scene describes."""
     table = scene.structure.interface[number]
+    patch = _build_interface_patch(scene, number)
+    load = table.normal_load
+    if load is None:
+        load = patch.nominal_load
     return InterfaceLaw(
         key=f"structure.interface.{number}",
-        numbers=make_effective_law(table, table.contact and table.contact.width, table.normal_load),
-        load=table.normal_load,
-        patch=_build_interface_patch(scene, number),
+        numbers=make_effective_law(table, table.contact and table.contact.width),
+        load=load,
+        patch=patch,
     )
 
 

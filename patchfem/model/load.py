@@ -117,10 +117,10 @@ def build_grooves(scene) -> grooves.Grooves | None:
     return grooves.Grooves(keys.wavelength, keys.amplitude, keys.phase, keys.lifted_mass, key)
 
 
-def build_point_load(scene) -> PointLoad | None:
-    """Build the load of [normal] or of the first interface of a scene, or None if neither gives one."""
-    if scene.structure is not None and scene.structure.interface:
-        return PointLoad(scene.structure.interface[0].normal_load)
+def build_point_load(scene, rig=None) -> PointLoad | None:
+    """Build the load of [normal] of a scene or of the first interface of its Rig, or None if neither gives one."""
+    if rig is not None and scene.structure.interface:
+        return PointLoad(rig.friction.interfaces[0].load)
     keys = scene.normal
     if keys is None:
         return None

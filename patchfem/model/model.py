@@ -21,7 +21,7 @@ from ..scene.overrides import replace_number
 from ..scene.rules.methods import MotionFeatures, find_motion_features
 from ..scene.scene import Scene
 from . import load, patch, rig, slide, structure, wear
-from .law import find_normal_load, find_pad_width, make_bond_parameters, make_effective_law
+from .law import find_pad_width, make_bond_parameters, make_effective_law
 from .source import SceneWriter, Source, locate_errors
 
 if TYPE_CHECKING:
@@ -233,10 +233,6 @@ def _build(scene: Scene) -> Model:
     patch_model = None
     if scene.contact is not None:
         patch_model = patch.build_patch(scene.contact, scene.resolve_path)
-    point = grooves = None
-    if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
-        point = load.build_point_load(scene)
-        grooves = load.build_grooves(scene)
     path = slide.build_slide(scene) if scene.slide is not None else None
 
     # Rig and law; the mesh of the patch follows from what moves it.
@@ -244,6 +240,10 @@ def _build(scene: Scene) -> Model:
     if scene.structure is not None:
         rig_model = rig.build_rig(scene)
         rig_model = _attach_bolted_model(scene, rig_model)
+    point = grooves = None
+    if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
+        point = load.build_point_load(scene, rig_model)
+        grooves = load.build_grooves(scene)
 
     # The mesh of a patch is finer where contact edges move, or where partial slip must be resolved
     law = _build_law(scene, rig_model)
@@ -395,7 +395,7 @@ def _build_law(scene: Scene, rig_model: Rig | None) -> _SceneLaw:
     if rig_model is not None:
         friction = rig_model.friction.interfaces[0].numbers
     else:
-        friction = make_effective_law(law, pad, find_normal_load(scene))
+        friction = make_effective_law(law, pad)
     return _SceneLaw(friction, law.spread, pad)
 
 

@@ -3,16 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..mesh.ends import SHARP_END, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material, OnePiece
 from ..scene.keys.quantities import UNIT_FACTORS
 from . import peaks, profile
 from .gap import N_DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap_shapes
-
-if TYPE_CHECKING:
-    from ..mesh.pieces import Mesh
 
 # Largest number of cells along the longer side of a face that is only pressed, of one whose slip is followed by parallel
 # elements, of one whose cells are contact points of a law with memory or wear in many jumps, and of one whose cells have
@@ -243,8 +240,6 @@ class PatchMesh:
     - file: mesh file of the two pieces.
     - is_fine: whether the patch is static or in a bench without wear, so that most of the time goes into the mesh.
     - edge_motion: cause of a motion of the edges of the contact: ``"load"``, ``"wear"`` or ``""``.
-    - shared: meshes (lower, upper) that serve all cases of a sweep, from fine to coarse. The upper one is None if it is
-      like the lower one.
     - slip: slide whose partial slip the mesh has to resolve.
     - n_finer: halvings of the elements beyond those that the static measures need.
     """
@@ -253,7 +248,6 @@ class PatchMesh:
     file: MeshFile | None
     is_fine: bool = False
     edge_motion: str = ""
-    shared: "tuple[tuple[Mesh, Mesh | None], ...] | None" = None
     slip: PrescribedSlip | None = None
     n_finer: int = 0
 

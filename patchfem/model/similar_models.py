@@ -15,7 +15,6 @@ import numpy as np
 from ..core import frozen_array
 from ..scene.rules.methods import find_motion_features
 from . import patch as patches
-from .law import complete_bond_length, find_normal_load
 from .load import build_point_load
 from .model import Model, write_resolved
 from .rig import build_drive, build_rig
@@ -118,16 +117,16 @@ def replace_numbers(
         # The bonded spring couples the modes of the scene, so they are computed anew.
         with locate_errors(scene):
             rig = build_rig(scene)
-        changes["point"] = build_point_load(scene)
+        changes["point"] = build_point_load(scene, rig)
         changes["friction"] = rig.friction.interfaces[0].numbers
     else:
         if "normal" in tables:
             changes["point"] = build_point_load(scene)
         if model.friction is not None and tables & {"friction", "normal", "contact"}:
-            law = changes["friction"] = complete_bond_length(
-                scene.friction, find_normal_load(scene)
+            changes["friction"] = scene.friction
+            interfaces = tuple(
+                replace(one, numbers=scene.friction) for one in rig.friction.interfaces
             )
-            interfaces = tuple(replace(one, numbers=law) for one in rig.friction.interfaces)
             rig = replace(rig, friction=replace(rig.friction, interfaces=interfaces))
         if "drive" in tables:
             rig = replace(rig, drive=build_drive(scene, rig.modes))

@@ -29,12 +29,10 @@ class WornFriction:
 
     def compute_worn_law(self, law: Friction, depth: float) -> Friction:
         """Return a friction law whose parameters are changed for a mean worn depth [m]."""
-        # With a given stiffness, the bond length follows from the coefficient.
-        bond_length = self.bond_length if law.stiffness is None else self.coefficient
         factors = {
             "static": self.coefficient,
             "kinetic": self.coefficient,
-            "bond_length": bond_length,
+            "bond_length": self.bond_length,
         }
         changes = {}
         for name, factor in factors.items():

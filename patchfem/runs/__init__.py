@@ -19,79 +19,15 @@ it:
 13. `batch`  many models in one batch
 """
 
-# names that other folders use, by module
+# names that tests and scripts import from the folder, by module
 PUBLIC = {
     "findings": ("compute_accuracy_curve",),
-    "batch.batches": (
-        "MIN_CHUNK_CASES",
-        "find_group",
-        "solve_models",
-    ),
-    "batch.case_results": (
-        "CaseResults",
-        "FAILED_OUTCOME",
-    ),
-    "batch.meshes": (
-        "NO_SHARED_MESHES",
-        "SharedMeshes",
-        "with_shared_meshes",
-    ),
-    "batch.motion_observer": ("MotionObserver",),
-    "bench.engine": (
-        "choose_smooth_bond_summation",
-        "steps_per_cycle",
-    ),
-    "bench.errors": ("estimate_bench_errors",),
-    "joint": ("find_stuck_patch_stiffness",),
-    "patch.faces": ("has_error_meshes",),
-    "patch.jenkins_elements": ("elements",),
+    "batch.case_results": ("CaseResults", "FAILED_OUTCOME"),
     "patch.mesh_levels": ("solve_with_coarser",),
-    "probe": ("run_probe",),
-    "patch.result": ("make_piece_meshes_of_run",),
-    "patch.values": ("find_contact_intervals",),
-    "pieces": (
-        "PieceFields",
-        "Pieces",
-        "add_yielding_notes",
-        "compute_pieces",
-    ),
-    "plan": (
-        "DIMENSIONLESS_GROUPS",
-        "Plan",
-    ),
-    "results.patch_rows": (
-        "PATCH_TABLE",
-        "find_unknown_measures",
-    ),
-    "results.result": (
-        "Result",
-        "collect_used_settings",
-        "describe_measure",
-        "engine_by_measure",
-        "patch_surface",
-        "shorten_file_names",
-    ),
-    "rig.decays": (
-        "make_laws_on_coarse_meshes",
-        "tabulate_static_motions",
-        "make_laws_on_mesh",
-        "estimate_mesh_error",
-        "compute_static_curve",
-        "with_automatic_method",
-    ),
-    "rig.engines": (
-        "ENGINES",
-        "choose_numerics",
-        "estimate_hybrid_errors",
-        "find_obstacle_of_map",
-    ),
-    "rig.plan": (
-        "find_drive_and_knee",
-        "stuck_stiffnesses",
-    ),
-    "run": (
-        "StateFile",
-        "is_march",
-    ),
+    "pieces": ("PieceFields", "Pieces", "compute_pieces"),
+    "results.patch_rows": ("PATCH_TABLE",),
+    "results.result": ("describe_measure",),
+    "rig.engines": ("choose_numerics",),
+    "rig.plan": ("find_drive_and_knee",),
     "wear.evolve": ("compute_wear",),
 }

@@ -206,8 +206,6 @@ def _advise_mesh(
         return Advice(f"{cause}leave out {ELEMENT_SIZE_KEY}", ELEMENT_SIZE_KEY)
     if missed.is_limited("mesh"):
         return _advise_limit(missed, "finer meshes", cause)
-    if any(patch_model.mesh.shared is not None for patch_model, _ in solved):
-        return Advice(f"{cause}run this case by itself, so that its mesh is refined")
     # The main measures have decided on the mesh; another measure needs a smaller tolerance.
     tolerance = PROPOSED_TOLERANCE_RATIO * missed.model.accuracy.tolerance
     is_at_limit = is_at_limit or refine.is_main(missed.worst)

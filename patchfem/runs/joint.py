@@ -23,7 +23,7 @@ from ..model.model import Model
 from ..model.source import Source, locate_errors
 from ..model.structure import compute_sticking_stiffness
 from ..slip.edge_springs import add_edge_springs
-from .patch import mesh_levels
+from .patch import faces, mesh_levels
 from .patch.jenkins_elements import compute_stick_stiffness
 from .patch.press import Patch, Patches
 
@@ -69,8 +69,23 @@ def solve_without_joint(model: Model) -> FreeRig:
         If the joint is stiffer than the modes allow, or has no stiffness.
     """
     if model.patch is None:
-        return FreeRig(model, ())
+        return FreeRig(press_interfaces(model) if model.has_interface_patches else model, ())
     return remove_joint(model, solve_patch(model))
+
+
+def press_interfaces(model: Model) -> Model:
+    """Return a model whose interfaces with a prescribed approach have the loads of their pressed patches."""
+    interfaces = model.rig.friction.interfaces
+    if not any(part.patch is not None and part.patch.loading.load is None for part in interfaces):
+        return model
+    pressed = []
+    for interface in interfaces:
+        if interface.patch is not None:
+            patch = faces.solve_contact_on_meshes(interface, model.accuracy.tolerance)[0]
+            interface = replace(interface, load=float(patch.pressure.load))
+        pressed.append(interface)
+    rig = replace(model.rig, friction=replace(model.rig.friction, interfaces=tuple(pressed)))
+    return replace(model, rig=rig, point=replace(model.point, load=pressed[0].load))
 
 
 def solve_patch(model: Model, solved: Patches = ()) -> Patches:

@@ -67,6 +67,7 @@ class Plan:
     - chain: stiffness [N/m], or "rigid", of each element in series between modes and interface.
     - groups: dimensionless groups by name.
     - verdict: sentences on the run.
+    - draws_curve: whether a response curve is drawn; without it only its peak is computed, as for a case of a sweep.
     """
 
     model: Model
@@ -76,6 +77,7 @@ class Plan:
     chain: "of_rig.Chain"
     groups: Values
     verdict: tuple[str, ...]
+    draws_curve: bool = True
 
     @property
     def kind(self) -> str:

@@ -364,10 +364,5 @@ def _refine_mesh(patch_model):
 
 
 def _can_refine(patch_model) -> bool:
-    """Return whether a run may halve the mesh of a patch: not one of the scene, of a sweep, or the cells of a face."""
-    return (
-        patch_model is not None
-        and patch_model.area is None
-        and patch_model.mesh.is_automatic
-        and patch_model.mesh.shared is None
-    )
+    """Return whether a run may halve the mesh of a patch: not one of the scene, or the cells of a face."""
+    return patch_model is not None and patch_model.area is None and patch_model.mesh.is_automatic

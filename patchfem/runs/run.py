@@ -19,7 +19,6 @@ from ..cost_model import measure_cpu_time
 from ..model.model import Model
 from ..model.source import locate_errors
 from . import joint, refine
-from .bench import result as bench_result
 from .findings import find_missed_measures, mark_unbalanced
 from .patch import area_motion, faces, mesh_levels, store, strength
 from .patch import result as patch_result
@@ -80,7 +79,7 @@ def run(
     say : callable, optional
         Callback for a line of text when code has to be compiled, or when the run is repeated with a finer resolution.
     progress : callable, optional
-        Callback for the completed fraction: of all passes of a rig, or of the main pass of a bench.
+        Callback for the completed fraction of all runs.
     estimate : bool
         Whether to estimate the errors from coarser runs; if False, the errors are None.
     fresh : bool
@@ -191,6 +190,8 @@ class _Passes:
         meshes of the pass before are not solved again.
         """
         start = process_time()
+        if model.has_interface_patches:
+            model = joint.press_interfaces(model)
         run_plan = replace(self.plan, model=model)
         warnings = list(model.source.remarks)
         notes = list(model.source.notes)
@@ -252,10 +253,8 @@ class _Passes:
             with self._saving_context(run_plan, moved.patch):
                 if run_plan.kind == "patch":
                     result = patch_result.make_static_result(moved)
-                elif run_plan.kind == "bench":
-                    result = bench_result.run_prescribed(moved)
                 else:
-                    result = rig.run_rig(moved)
+                    result = rig.run_motion(moved)
         except NotConverged as error:
             if moved.patch is not None and run_plan.kind != "patch":
                 error.partial_result = _make_result_at_rest(moved, run_plan)

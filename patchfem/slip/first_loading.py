@@ -281,32 +281,6 @@ def make_cell_elements(compliance: CellCompliance, limit: np.ndarray) -> CellEle
     return CellElements(points, force_limit, loading, *sliders, forces)
 
 
-def list_band_sliders(
-    elements: CellElements, bands: np.ndarray, n_bands: int
-) -> list[SpringSliders]:
-    """Return the elements of bands of a face, each with its part of the force while the whole face slides.
-
-    Parameters
-    ----------
-    elements : CellElements
-        Elements of the whole face.
-    bands : (m,) ndarray
-        Number of the band of each cell.
-    n_bands : int
-        Number of bands; one without load yields at once.
-    """
-    force = elements.loading.force
-    knots, curve = _interpolate_force(elements.loading)
-    out = []
-    for band in range(n_bands):
-        own = force[:, bands[elements.points] == band].sum(axis=1)
-        if own[-1] > 0:
-            out.append(make_spring_sliders(knots, np.interp(curve, force.sum(axis=1), own)))
-        else:
-            out.append(SpringSliders(np.ones(1), np.zeros(1)))
-    return out
-
-
 def find_reversal(compliance: CellCompliance, limit: np.ndarray, amplitude: float) -> ReversalState:
     """Find the state of a face at the reversal of steady cycles with a displacement amplitude [m].
 

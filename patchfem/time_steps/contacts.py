@@ -1,7 +1,7 @@
 """Contact points of a rig or a bench: their laws, their ports, their loads, and the shear of their pieces."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -55,6 +55,7 @@ class PointSet:
     - is_spring: whether the point is a spring
     - lower: pressure of the lower piece, if it gives the loads, or None
     - bond_sum: sum over the bonds of points with lists, or None
+    - shares_shear: whether the shear coordinates are those of the set before it, because the pieces are the same
     """
 
     law: PointLaw
@@ -64,6 +65,28 @@ class PointSet:
     is_spring: bool = False
     lower: LowerPressure | None = None
     bond_sum: BondSum | None = None
+    shares_shear: bool = False
+
+    def split(self, numbers: np.ndarray, rows: np.ndarray) -> "list[PointSet]":
+        """Return the set divided among ports, whose points deform the same pieces.
+
+        Parameters
+        ----------
+        numbers : (m,) array
+            Number of the port of each point.
+        rows : (p, n) array
+            Displacement of the ports per modal coordinate.
+        """
+        parts = []
+        for k, row in enumerate(rows):
+            own = numbers == k
+            shear = self.shear
+            shear = replace(
+                shear, points=shear.points[own], limit=shear.limit[own], shape=shear.shape[own]
+            )
+            law = self.law.select(own)
+            parts.append(replace(self, law=law, row=row, shear=shear, shares_shear=k > 0))
+        return parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +120,14 @@ class Contact:
     def is_rigid(self, point_set: PointSet) -> bool:
         """Return whether a set of points sticks without displacement."""
         return point_set.law.law == Law.COULOMB
+
+    @property
+    def first_sets(self) -> list[PointSet]:
+        """Sets of the first interface: one, or one for each band of a face whose bands deform the same pieces."""
+        n_sets = 1
+        while n_sets < len(self.point_sets) and self.point_sets[n_sets].shares_shear:
+            n_sets += 1
+        return self.point_sets[:n_sets]
 
     @property
     def has_lists(self) -> bool:

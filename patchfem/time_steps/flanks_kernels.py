@@ -52,7 +52,8 @@ def climb(flank, q, dq, dt):
         path += (4 / 9 if k == 0 else 5 / 18) * sqrt(1 + t * t)
     flank[Flank.RATIO] = path
     rise = flank[Flank.SLOPE] * dq / dt - flank[Flank.RISE_SPEED]
-    flank[Flank.TRIAL_VERTICAL] = flank[Flank.LOAD] + 2 * flank[Flank.LIFTED_MASS] * rise / dt
+    load = flank[Flank.LOAD] + flank[Flank.ADDED]
+    flank[Flank.TRIAL_VERTICAL] = load + 2 * flank[Flank.LIFTED_MASS] * rise / dt
 
 
 @njit(**NJIT_CALL)
@@ -109,23 +110,22 @@ def add_climb(flank, moves, dq, dt, end):
 def find_normal(flank, q):
     """Return the normal force [N] at a slide q [m] under the vertical force and the friction of the trial step."""
     t = find_slope(flank, q)
-    vertical = max(flank[Flank.TRIAL_VERTICAL], 0.0)
+    vertical = max(flank[Flank.TRIAL_VERTICAL] + flank[Flank.RISE], 0.0)
     return max(vertical * sqrt(1 + t * t) + flank[Flank.TRIAL_FORCE] * t, 0.0)
 
 
 @njit(**NJIT_CALL)
 def find_energy(flank, q):
-    """Return the energy [J] of the height of the load and of the lifted mass at a slide q."""
+    """Return the energy [J] of the lifted mass at a slide q, and the work done on the load since height 0."""
     half = sin(0.5 * (flank[Flank.WAVE_NUMBER] * q - flank[Flank.PHASE]))
     height = 2 * flank[Flank.AMPLITUDE] * half * half
-    return (
-        flank[Flank.LOAD] * height + 0.5 * flank[Flank.LIFTED_MASS] * flank[Flank.RISE_SPEED] ** 2
-    )
+    kinetic = 0.5 * flank[Flank.LIFTED_MASS] * flank[Flank.RISE_SPEED] ** 2
+    return flank[Flank.LOAD] * height + flank[Flank.ADDED_WORK] + kinetic
 
 
 @njit(**NJIT_CALL)
 def accept_climb(flank, dq, dt):
-    """Advance the lifted mass over an accepted step.
+    """Advance the lifted mass and the work on the load over an accepted step.
 
     The mean of its rise speed over the step is slope dq/dt.
 
@@ -140,7 +140,8 @@ def accept_climb(flank, dq, dt):
     """
     rise = 2 * flank[Flank.SLOPE] * dq / dt
     flank[Flank.RISE_SPEED] = rise - flank[Flank.RISE_SPEED]
-    flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL]
+    flank[Flank.VERTICAL] = flank[Flank.TRIAL_VERTICAL] + flank[Flank.RISE]
+    flank[Flank.ADDED_WORK] += flank[Flank.ADDED] * flank[Flank.SLOPE] * dq
     if flank[Flank.LIFTED_MASS] > 0 and not flank[Flank.VERTICAL] > 0:
         flank[Flank.HAS_LIFTED] = 1.0
 

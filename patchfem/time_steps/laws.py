@@ -70,7 +70,8 @@ class PointLaw(NamedTuple):
         def reshape(rows, mode):
             """Return rows (k, m) by blocks, (b, k WIDTH)."""
             padded = np.pad(rows, ((0, 0), (0, pad)), mode)
-            return padded.reshape(len(rows), n_blocks, WIDTH).swapaxes(0, 1).reshape(n_blocks, -1)
+            blocks = padded.reshape(len(rows), n_blocks, WIDTH).swapaxes(0, 1)
+            return blocks.reshape(n_blocks, len(rows) * WIDTH)
 
         # The first row of a memory may be a length, by which a law divides.
         numbers = reshape(self.numbers, "edge")
@@ -83,9 +84,16 @@ class PointLaw(NamedTuple):
             cells = np.concatenate([np.full(WIDTH, float(size)), *self.sliders])
             numbers = np.hstack([numbers, np.tile(cells, (n_blocks, 1))])
             springs = np.repeat(load[:, :, None], size, axis=2)
-            memory = np.concatenate([np.zeros_like(springs), springs], axis=2).reshape(n_blocks, -1)
+            memory = np.concatenate([np.zeros_like(springs), springs], axis=2)
+            memory = memory.reshape(n_blocks, 2 * size * WIDTH)
         counts = np.minimum(count - WIDTH * np.arange(n_blocks), WIDTH)
         return Blocks(numbers, memory, load, back, counts)
+
+    def select(self, points) -> "PointLaw":
+        """Return the selected points, by a mask (m,)."""
+        back = None if self.back is None else self.back[points]
+        arrays = self.numbers, self.memory, self.load, self.stiffness, self.viscosity
+        return PointLaw(self.law, *(array[..., points] for array in arrays), self.sliders, back)
 
     @property
     def limits(self) -> np.ndarray:

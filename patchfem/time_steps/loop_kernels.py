@@ -79,6 +79,13 @@ def try_step(system, level, row, begin, end, drive):
     dt = system.options.step / (1 << level)
     move_freely(system, level, drive, row, begin)
     extrapolate_shear(system.points, dt)
+    loads = system.structure.loads
+    if system.flank.size and loads.size:
+        slope = loads[row + 1] - loads[row]
+        system.flank[Flank.ADDED] = (
+            loads[row] + 0.5 * (begin + end) * slope - system.flank[Flank.LOAD]
+        )
+        system.flank[Flank.RISE] = 0.5 * (end - begin) * slope
     is_solved = steps.solve_step(system, level, row, end)
     if system.sets.counters[PRESENT_SLOT_INDEX] < 0:
         return True

@@ -106,8 +106,8 @@ def place_block(system, block, move, velocity, step):
     values = points.values[block]
     port = points.port[block]
     n_lanes = count_lanes(points, block)
-    start = points.first_shear[port]
-    stop = points.first_shear[port + 1]
+    start = points.shears[port, 0]
+    stop = points.shears[port, 1]
     for j in range(n_lanes):
         values[Value.BENT + j] = 0.0
         values[Value.SLIDE + j] = move
@@ -171,7 +171,7 @@ def weigh_block(points, block, damping, step):
     port = points.port[block]
     n_lanes = count_lanes(points, block)
     rest = 1 - damping
-    if points.first_shear[port] == points.first_shear[port + 1]:
+    if points.shears[port, 0] == points.shears[port, 1]:
         for j in range(n_lanes):
             end = damping * values[Value.END + j]
             values[Value.FORCE + j] = end + rest * values[Value.MEAN + j]
@@ -365,25 +365,22 @@ def write_residual(system, level):
 
     # kappa (b + db) = shapes^T f1, for lists kappa (b + db/2) = shapes^T mean
     shear = points.shear
-    for p in range(n_ports):
-        weight = find_shear_weight(points, p)
+    for k in range(points.stiffness.size):
+        weight = find_shear_weight(points, k)
         row = Value.END if weight == 1.0 else Value.MEAN
-        for k in range(points.first_shear[p], points.first_shear[p + 1]):
-            residual = shear[Shear.VALUE, k] + weight * shear[Shear.TRIAL, k]
-            residual *= points.stiffness[k]
-            for block in range(points.first[p], points.first[p + 1]):
-                residual -= sum_shape(points, k, block, row)
-            vector[n_ports + k] = residual
-            largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / (RESIDUAL * size))
+        residual = shear[Shear.VALUE, k] + weight * shear[Shear.TRIAL, k]
+        residual *= points.stiffness[k]
+        for block in range(points.bent[k, 0], points.bent[k, 1]):
+            residual -= sum_shape(points, k, block, row)
+        vector[n_ports + k] = residual
+        largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / (RESIDUAL * size))
     return largest
 
 
 @njit(**NJIT_CALL)
-def find_shear_weight(points, p):
-    """Return the part of a step at whose end the pieces of port p are in equilibrium: 1, or 1/2 for lists."""
-    block = points.first[p]
-    has_lists = block < points.first[p + 1] and points.law[block] == Law.LIST
-    return 0.5 if has_lists else 1.0
+def find_shear_weight(points, k):
+    """Return the part of a step at whose end shear coordinate k is in equilibrium: 1, or 1/2 for lists."""
+    return 0.5 if points.law[points.bent[k, 0]] == Law.LIST else 1.0
 
 
 @njit(**NJIT_CALL)
@@ -449,10 +446,12 @@ def write_matrix(system, level, step):
     compliance = ports.compliance[level]
     n_ports = moves.shape[1]
     matrix[:] = 0.0
+    for k in range(points.stiffness.size):
+        matrix[n_ports + k, n_ports + k] = find_shear_weight(points, k) * points.stiffness[k]
     for p in range(n_ports):
         damping = moves[Port.DAMPING, p]
-        start = points.first_shear[p]
-        stop = points.first_shear[p + 1]
+        start = points.shears[p, 0]
+        stop = points.shears[p, 1]
         ratio = system.flank[Flank.RATIO] if system.flank.size and p == 0 else 1.0
         if start < stop:
             write_products(points, p, matrix, n_ports, step)
@@ -462,7 +461,7 @@ def write_matrix(system, level, step):
             v = compliance[1, p, k]
             matrix[p, k] = -moves[Port.BY_SLIDE, p] * move - moves[Port.BY_VELOCITY, p] * v
             for l in range(start, stop):
-                matrix[n_ports + l, k] = ratio * points.products[l, 0] * move
+                matrix[n_ports + l, k] += ratio * points.products[l, 0] * move
         for l in range(start, stop):
             matrix[p, n_ports + l] = ratio * points.products[l, 1]
         matrix[p, p] -= 1.0
@@ -481,10 +480,10 @@ def write_matrix(system, level, step):
 
 @njit(**NJIT_CALL)
 def write_products(points, p, matrix, n_ports, step):
-    """Write the derivatives of the residuals of the shear coordinates of port p.
+    """Add the derivatives of the residuals of the shear coordinates of port p.
 
-    Those by the coordinates go to `matrix`, those by the increment of the port, and of the port force by the coordinates, to
-    `points.products`.
+    Those by the coordinates are added to `matrix`; those by the increment of the port, and of the port force by the
+    coordinates, are written to `points.products`.
 
     Parameters
     ----------
@@ -499,14 +498,13 @@ def write_products(points, p, matrix, n_ports, step):
     step : Step
         Formula of the velocity.
     """
-    start = points.first_shear[p]
-    stop = points.first_shear[p + 1]
-    weight = find_shear_weight(points, p)
+    start = points.shears[p, 0]
+    stop = points.shears[p, 1]
+    weight = find_shear_weight(points, start)
     by_slide_row = Value.END_BY_SLIDE if weight == 1.0 else Value.MEAN_BY_SLIDE
     for k in range(start, stop):
         points.products[k, 0] = 0.0
         points.products[k, 1] = 0.0
-        matrix[n_ports + k, n_ports + k] = weight * points.stiffness[k]
     for block in range(points.first[p], points.first[p + 1]):
         values = points.values[block]
         at = WIDTH * block
@@ -800,7 +798,7 @@ def gains_energy(system):
         block = points.first[p]
         if block < points.first[p + 1] and points.law[block] == Law.TANH:
             force = moves[Port.FORCE, p]
-            if points.first_shear[p] == points.first_shear[p + 1]:
+            if points.shears[p, 0] == points.shears[p, 1]:
                 size = max(abs(force), system.options.scale) * abs(moves[Port.INCREMENT, p])
                 if force * moves[Port.INCREMENT, p] < -RESIDUAL * size:
                     return True
@@ -941,7 +939,7 @@ def find_order(system):
     for p in range(moves.shape[1]):
         block = points.first[p]
         is_tanh = block < points.first[p + 1] and points.law[block] == Law.TANH
-        if not is_tanh or points.first_shear[p] == points.first_shear[p + 1]:
+        if not is_tanh or points.shears[p, 0] == points.shears[p, 1]:
             continue
         change = 0.5 * (moves[Port.FREE_VELOCITY, p] - moves[Port.VELOCITY, p])
         change /= points.numbers[block, WIDTH]
@@ -949,7 +947,7 @@ def find_order(system):
 
         jump = 0.0
         size = 0.0
-        for k in range(points.first_shear[p], points.first_shear[p + 1]):
+        for k in range(points.shears[p, 0], points.shears[p, 1]):
             last = shear[Shear.LAST, k] / shear[Shear.SCALE, k]
             earlier = shear[Shear.EARLIER, k] / shear[Shear.SCALE, k]
             jump += abs(last - earlier)

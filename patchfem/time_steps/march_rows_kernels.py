@@ -82,12 +82,14 @@ class Shear(IntEnum):
 class Flank(IntEnum):
     """Entries of `System.flank`: grooves whose flanks port 0 climbs.
 
-    - LOAD [N], WAVE_NUMBER [rad/m], AMPLITUDE [m], PHASE [rad], LIFTED_MASS [kg]: geometry and load
-    - RISE_SPEED [m/s], VERTICAL [N], FORCE [N], NORMAL [N]: vertical speed of the lifted mass, mean vertical force of
-      the last step, force along the flank and normal force at its end
+    - LOAD [N], WAVE_NUMBER [rad/m], AMPLITUDE [m], PHASE [rad], LIFTED_MASS [kg]: geometry and load at the start
+    - RISE_SPEED [m/s], VERTICAL [N], FORCE [N], NORMAL [N]: vertical speed of the lifted mass, vertical force of the last
+      step (its mean, except for a prescribed load), force along the flank and normal force at its end
     - SLOPE, RATIO: mean height and path along the flank per increment of a trial step [1]
     - TRIAL_VERTICAL, TRIAL_FORCE: mean vertical force of a trial step, and force along the flank at its end [N]
     - HAS_LIFTED: 1 after the vertical force has vanished
+    - ADDED, RISE: mean change of a prescribed load since the start in a trial step, and its end value less the mean [N]
+    - ADDED_WORK: its work on the height since the start [J]
     """
 
     LOAD = 0
@@ -104,6 +106,9 @@ class Flank(IntEnum):
     TRIAL_VERTICAL = 11
     TRIAL_FORCE = 12
     HAS_LIFTED = 13
+    ADDED = 14
+    RISE = 15
+    ADDED_WORK = 16
 
 
 class Total(IntEnum):

@@ -91,7 +91,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
         if end in frames:
             force, slip = samples[-1, Sample.PORTS : Sample.PORTS + 2]
             motion = (float(time[end]), float(slide[end]), force, slip, 0.0, 0.0)
-            snapshots.append(make_snapshot(system, contact.point_sets[0], motion))
+            snapshots.append(make_snapshot(system, contact.first_sets, motion))
         if report is not None:
             report(end / last)
 

@@ -164,11 +164,13 @@ class Points(NamedTuple):
     """Points of p ports in b blocks; r shear coordinates of the pieces.
 
     - law, port, count, n_memory (b,): law, port, number of points and used entries of the memory of each block
-    - first, first_shear (p + 1,): first block and first shear coordinate of each port
+    - first (p + 1,): first block of each port
+    - shears (p, 2): first shear coordinate of each port, and the one after its last; several ports may have the same
     - numbers (b, k), memory, trial (b, l), values (b, v): arrays of the laws (`time_steps`)
     - node (b, s): node whose force is the load of a point; -1 for a fraction `share` of the resultant, -2 for `share`
       times the pressure of the lower piece at the place of the point. s = WIDTH; 2 WIDTH with the loads of slides to -x
     - share, place (b, s): fraction of the resultant or factor of the pressure [N]; position at rest [m]
+    - bent (r, 2): first block of the points that follow a shear coordinate, and the one after their last
     - shapes (r, b WIDTH), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
     - shear (8, r): see `march_rows_kernels.Shear`
     - is_spring (p,): whether the points of a port are springs, whose work is not friction
@@ -185,7 +187,7 @@ class Points(NamedTuple):
     count: np.ndarray
     n_memory: np.ndarray
     first: np.ndarray
-    first_shear: np.ndarray
+    shears: np.ndarray
     numbers: np.ndarray
     memory: np.ndarray
     trial: np.ndarray
@@ -193,6 +195,7 @@ class Points(NamedTuple):
     node: np.ndarray
     share: np.ndarray
     place: np.ndarray
+    bent: np.ndarray
     shapes: np.ndarray
     stiffness: np.ndarray
     shear: np.ndarray

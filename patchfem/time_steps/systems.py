@@ -302,12 +302,11 @@ def _make_points(contact, n_ports: int) -> Points:
     share = np.zeros(node.shape)
     place = np.zeros(node.shape)
     n_moving = n_ports - len(sets)  # ports of heave and pitch have no points
-    shears = [point_set.shear for point_set in sets]
-    n_shear = [0 if shear is None else len(shear.stiffness) for shear in shears]
-    first_shear = np.cumsum([0, *n_shear, *[0] * n_moving])
-    shapes = np.zeros((sum(n_shear), n_blocks * WIDTH))
-    stiffness = np.zeros(sum(n_shear))
-    scale = np.ones(sum(n_shear))
+    shears = _number_shears(sets, n_ports)
+    n_shear = shears.max(initial=0)
+    bent = np.zeros((n_shear, 2), np.int64)
+    shapes = np.zeros((n_shear, n_blocks * WIDTH))
+    stiffness = np.zeros(n_shear)
 
     resultant = contact.preload
     if contact.grooves is not None:
@@ -336,15 +335,17 @@ def _make_points(contact, n_ports: int) -> Points:
                     point_set.lower.places + shifts[p][-1 if row else 0]
                 )
         if point_set.shear is not None:
-            own = slice(first_shear[p], first_shear[p + 1])
-            shape = np.asarray(point_set.shear.shape).T
-            shapes[own, places] = shape
+            own = slice(*shears[p])
+            shapes[own, places] = np.asarray(point_set.shear.shape).T
             stiffness[own] = point_set.shear.stiffness
-            scale[own] = 1 / np.sqrt((shape**2).mean(axis=1))
+            bent[own, 1] = end
+            if not point_set.shares_shear:
+                bent[own, 0] = first
         first = end
 
     shear = np.zeros((len(Shear), stiffness.size))
-    shear[Shear.SCALE] = scale
+    parts = [shapes[k, WIDTH * begin : WIDTH * end] for k, (begin, end) in enumerate(bent)]
+    shear[Shear.SCALE] = [np.sqrt(np.count_nonzero(part) / (part @ part)) for part in parts]
     n_nodes = 0 if contact.sets is None else contact.sets.x.size
     return Points(
         np.repeat([int(point_set.law.law) for point_set in sets], counts).astype(np.int64),
@@ -352,12 +353,13 @@ def _make_points(contact, n_ports: int) -> Points:
         np.concatenate([np.zeros(0, np.int64), *(part.count for part in blocks)]),
         _count_memory(sets, blocks),
         np.cumsum([0, *counts, *[0] * n_moving]),
-        first_shear,
+        shears,
         numbers,
         memory,
         memory.copy(),
         values,
         *(np.hstack(array) for array in (node, share, place)),
+        bent,
         shapes,
         stiffness,
         shear,
@@ -369,6 +371,18 @@ def _make_points(contact, n_ports: int) -> Points:
         np.zeros(1),
         np.zeros((stiffness.size, 2)),
     )
+
+
+def _number_shears(sets, n_ports: int) -> np.ndarray:
+    """Return the first shear coordinate (p, 2) of the points of each of `n_ports` ports, and the one after their last."""
+    shears = np.zeros((n_ports, 2), np.int64)
+    stop = 0
+    for p, point_set in enumerate(sets):
+        size = 0 if point_set.shear is None else len(point_set.shear.stiffness)
+        if not point_set.shares_shear:
+            stop += size
+        shears[p] = stop - size, stop
+    return shears
 
 
 def _join_pressures(sets) -> tuple[list[list[float]], np.ndarray]:

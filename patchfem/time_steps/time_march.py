@@ -27,6 +27,7 @@ from .march_rows_kernels import (
     RESIDUAL,
     TOO_MANY_PARTS,
     Flank,
+    Port,
     Sample,
     Shear,
     System,
@@ -71,6 +72,7 @@ class Snapshot(NamedTuple):
     - time [s], slide [m], force [N], slip [m] of the first port; heave [m] and pitch [rad]
     - forces, stretch, bend, load (m,): friction force [N], elastic stretch [m] and load [N] of each point, and its
       displacement by shear of the pieces [m]
+    - moves (m,): displacement of the port of each point [m]
     - nodal (k,): forces of the nodes [N]; (0,) if the pressure does not change
     - vertical: vertical force on the flanks of grooves [N]
     """
@@ -85,6 +87,7 @@ class Snapshot(NamedTuple):
     stretch: np.ndarray
     bend: np.ndarray
     load: np.ndarray
+    moves: np.ndarray
     nodal: np.ndarray
     vertical: float
 
@@ -327,7 +330,7 @@ class March:
         time = (self.done + self.shift) * self.step
         motion = (time, float(row @ sample[:n]), *remainder[Sample.PORTS : Sample.PORTS + 2])
         motion = (*motion, remainder[Sample.HEAVE], remainder[Sample.PITCH])
-        return make_snapshot(self.system, self.contact.point_sets[0], motion)
+        return make_snapshot(self.system, self.contact.first_sets, motion)
 
     def find_ledger(self, sample, energies) -> dict[str, float]:
         """Return energies [J] and counters by name at a sample of the present state, with the sums `Energy` up to it."""
@@ -388,31 +391,39 @@ def split_losses(samples, n: int, scale: float) -> np.ndarray:
     return np.where((losses < 0) & (losses > -noise), 0.0, losses)
 
 
-def make_snapshot(system: System, point_set, motion: tuple[float, ...]) -> Snapshot:
-    """Return the state of the points on the first port.
+def make_snapshot(system: System, point_sets, motion: tuple[float, ...]) -> Snapshot:
+    """Return the state of the points of the first interface.
 
     Parameters
     ----------
     system : march_rows_kernels.System
         Arrays of the march.
-    point_set : contacts.PointSet
-        Points on the first port.
+    point_sets : list of contacts.PointSet
+        Points on the first port, or on the ports of the bands of a face.
     motion : tuple
         The first six fields of Snapshot.
     """
-    count = np.size(point_set.law.numbers[0])
-    forces, stretch, loads = (
-        system.points.values[:, row : row + WIDTH].flatten()[:count]
-        for row in (Value.START, Value.STRETCH, Value.END_LOAD)
-    )
+    points = system.points
+    counts = [point_set.law.load.size for point_set in point_sets]
+
+    def collect(row: Value) -> np.ndarray:
+        """Return a row of the values of all points."""
+        parts = []
+        for p, count in enumerate(counts):
+            blocks = points.values[points.first[p] : points.first[p + 1], row : row + WIDTH]
+            parts.append(blocks.flatten()[:count])
+        return np.concatenate(parts)
 
     # The pieces at rest under the present forces; the march brings only their means over a step into equilibrium.
-    bend = np.zeros(count)
-    if point_set.shear is not None:
-        shape = np.asarray(point_set.shear.shape)
-        bend = shape @ (forces @ shape / point_set.shear.stiffness)
+    forces = collect(Value.START)
+    bend = np.zeros(forces.size)
+    if point_sets[0].shear is not None:
+        shape = np.concatenate([point_set.shear.shape for point_set in point_sets])
+        bend = shape @ (forces @ shape / point_sets[0].shear.stiffness)
+    moves = np.repeat(system.ports.values[Port.SLIDE, : len(counts)], counts)
+    arrays = forces, collect(Value.STRETCH), bend, collect(Value.END_LOAD), moves
     vertical = float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0
-    return Snapshot(*motion, forces, stretch, bend, loads, system.points.nodal.copy(), vertical)
+    return Snapshot(*motion, *arrays, points.nodal.copy(), vertical)
 
 
 def march(
@@ -754,6 +765,7 @@ def make_histories(run: March, rows) -> Response:
     if grooves is not None and grooves.lifted_mass:
         sliding = find_accelerations(modes, push, z, rate, pull) @ modes.slide
         motion = slides[:, 0], rates[:, 0], sliding
-        extra["normal_load"] = contact.preload + grooves.lifted_mass * grooves.find_lift(*motion)
+        load = contact.preload if contact.load is None else contact.load(time)
+        extra["normal_load"] = load + grooves.lifted_mass * grooves.find_lift(*motion)
 
     return make_response(modes, run.drive, push, (time, z, rate), pull, interfaces, extra)

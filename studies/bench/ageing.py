@@ -19,6 +19,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from friction_forms import steady_bond_length
+from study_run import run_study
 
 from patchfem.model import build
 from patchfem.runs.bench import bench as law_bench
@@ -155,4 +156,4 @@ def _draw(path: Path, rows: list, parts) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -29,14 +29,17 @@ shaker's ring-down was not available.
 Run: python studies/benchmarks/brake_reuss.py
 """
 
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import numpy as np
 from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import butter, hilbert, sosfiltfilt
 from scipy.stats import t as student
+from study_run import run_study
 
 import patchfem as pf
 
@@ -174,7 +177,8 @@ def score_lines() -> tuple:
     return damping_score(damping, SHAKER[:, 3]), float(np.sqrt(np.mean(misses**2)))
 
 
-if __name__ == "__main__":
+def print_all() -> None:
+    """Print the rows, the scores of straight lines, and the fit."""
     for row in main():
         print(
             f"{row.test} {1e6 * row.amplitude:6.1f} um: {row.measured_frequency:.3f} Hz, computed {row.frequency:.3f} "
@@ -185,3 +189,7 @@ if __name__ == "__main__":
     print(
         "fitted (ln static, chi, 1e3 damping), half of the widths of the intervals", *fit_damping()
     )
+
+
+if __name__ == "__main__":
+    run_study(print_all)

@@ -36,11 +36,14 @@ the same test and is used once; its stroke was 177 um. No traces before and afte
 Run: python studies/benchmarks/ti64_wear.py
 """
 
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import numpy as np
 from scipy.stats import t as student
+from study_run import run_study
 
 import patchfem as pf
 
@@ -225,7 +228,8 @@ def main() -> list:
     return [compute_track(test) for test in (*tests, PROFILE.test)]
 
 
-if __name__ == "__main__":
+def print_all() -> None:
+    """Print the tracks, the fitted coefficients and their scores."""
     for track in main():
         print(
             f"{track.name}: half width {1e3 * track.half_width:.3f} ± {1e3 * track.half_width_error:.3f} mm, measured "
@@ -247,11 +251,13 @@ if __name__ == "__main__":
     for test in OTHER_CONTACTS:
         ratio = fast[0] * test.work / test.volume
         print(f"{test.name}: {ratio:.2f} times the volume with the coefficient at 5 Hz")
-    works = [
-        test.work / compute_work(test)
-        for test in (*LOW_FREQUENCY, *FURTHER_TESTS, *FASTER_TESTS, *OTHER_CONTACTS)
-    ]
+    tests = (*LOW_FREQUENCY, *FURTHER_TESTS, *FASTER_TESTS, *OTHER_CONTACTS)
+    works = [test.work / compute_work(test) for test in tests]
     print("measured over computed friction work", np.round(works, 2))
     print("coefficient fitted to the depth [m^3/J of computed work]", fit_depth())
     by_volume = PROFILE.test.volume / compute_work(PROFILE.test)
     print("coefficient of its volume [m^3/J of computed work]", by_volume)
+
+
+if __name__ == "__main__":
+    run_study(print_all)

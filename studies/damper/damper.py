@@ -11,7 +11,7 @@ times what the cycles scatter, so that 538 rows count as some 60 in the interval
 The record (1 Hz, strokes of 51 mm, +-4.2 kN on the plateaus, peaks of 9.6 kN; two cycles that repeat to 0.12 kN) comes
 from the set of measurements named in `SOURCE`, which is not part of this project.
 
-Run: python studies/damper/damper.py FILE.csv [PICTURE.svg]
+Run: python studies/damper/damper.py --record FILE.csv
 """
 
 import sys
@@ -22,8 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-
 from steady_loops import HOLD, write_with_run_in
+from study_run import Option, run_study
 
 from patchfem.campaigns.fits.problem import FittedKeys
 from patchfem.campaigns.fits.request import FitOptions, fit_measurement
@@ -177,28 +177,25 @@ def draw(rows: list, path: Path) -> None:
         left.legend(frameon=False)
 
 
-if __name__ == "__main__":
-    if len(sys.argv) < 2 or not Path(sys.argv[1]).is_file():
-        missing = (
-            f"{sys.argv[1]} is no file"
-            if len(sys.argv) > 1
-            else "the record is not part of this project"
-        )
+def print_all(record: str = "", path: Path = Path("damper.svg")) -> None:
+    """Print the fits of every law to a record, and draw three of them."""
+    if not Path(record).is_file():
         sys.exit(
-            f"{missing}: get it as a CSV file ({SOURCE}) and run: python studies/damper/damper.py FILE.csv "
-            "[PICTURE.svg]"
+            f"the record is not part of this project: get it as a CSV file ({SOURCE}) for --record"
         )
-    table = main(sys.argv[1])
+    table = main(record)
     print(f"cycles repeat to {repeat(table[0].loop)[1]:.0f} N")
     for row in table:
-        values = ", ".join(
-            f"{one.key.partition('.')[2]} {value:.4g} {one.unit}"
-            for one, value in zip(row.fitted.keys.ranges, row.fitted.fit.values)
-        )
         fitted = row.fitted
+        pairs = zip(fitted.keys.ranges, fitted.fit.values)
+        values = [f"{one.key.partition('.')[2]} {value:.4g} {one.unit}" for one, value in pairs]
         print(
             f"{row.law:20s} rms {row.rms:6.0f} N, plateau {row.plateau:5.0f} N, work {row.work:5.1f} J of "
-            f"{row.measured:5.1f} J, counted rows {fitted.fit.intervals.rows:.0f}, {fitted.seconds:.0f} s: {values}"
+            f"{row.measured:5.1f} J, counted rows {fitted.fit.intervals.rows:.0f}, {fitted.seconds:.0f} s:",
+            ", ".join(values),
         )
-    if len(sys.argv) > 2:
-        draw([row for row in table if row.law in ("coulomb", "stretch", "iwan")], Path(sys.argv[2]))
+    draw([row for row in table if row.law in ("coulomb", "stretch", "iwan")], path)
+
+
+if __name__ == "__main__":
+    run_study(print_all, record=Option("", "CSV file of the record"))

@@ -6,13 +6,14 @@ Dahl's law, creeps by .272 bond lengths per cycle for ever, tanh with v_0 = 1 mm
 .0695. Coulomb, elastic-plastic and Iwan close every loop and do not creep. The law as printed locks up: .098, .030,
 .006, .0014 after 2, 3, 6, 12 cycles for p = 1, with energy out of nothing.
 
-Run: python studies/drift/drift_table.py [--full]      (without growing bonds; --full: with them)
+Run: python studies/drift/drift_table.py [--growing]      (with bonds that grow)
 """
 
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drift_laws import (
     CASES,
     LENGTH,
@@ -23,6 +24,7 @@ from drift_laws import (
     laws_without_bonds,
 )
 from force_control import OutOfReach, slides
+from study_run import Option, run_study
 
 CYCLES = 12
 
@@ -77,4 +79,4 @@ def _cell(found) -> str:
 
 
 if __name__ == "__main__":
-    main(growing="--full" in sys.argv[1:])
+    run_study(main, growing=Option(False, "with bonds that grow"))

@@ -15,6 +15,7 @@ from drawing import BLUE, GREY, drawing
 from drift_laws import LENGTH, PERIOD, ladder, make_bonds
 from force_control import OutOfReach, drift
 from friction_forms import dither_drift, stretch_loop
+from study_run import run_study
 
 FOLDER = Path(__file__).parent
 MARCHED_SWINGS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
@@ -75,4 +76,4 @@ def main(path: Path = FOLDER / "drift.svg", marched=MARCHED_SWINGS) -> Path:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

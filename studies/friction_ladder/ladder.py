@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from ladder_cycles import (
     AMPLITUDES,
     GROWTH,
@@ -41,6 +42,7 @@ from ladder_cycles import (
     printed_law_cycle,
     rate,
 )
+from study_run import run_study
 
 
 class Row(NamedTuple):
@@ -147,4 +149,4 @@ def main(amplitudes=AMPLITUDES) -> dict:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import ladder
 from drawing import BLUE, GREY, ORANGE, drawing
+from study_run import run_study
 
 FOLDER = Path(__file__).parent
 AMPLITUDES = 10.0 ** np.linspace(-1, 1.75, 12)
@@ -72,4 +73,4 @@ def main(path: Path = FOLDER / "ladder.svg", amplitudes=AMPLITUDES) -> Path:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -32,6 +32,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from failure_cases import CASES, SLIDES, STEPS, peak_errors, solve
 from problems import TWO, exact
+from study_run import run_study
 from study_text import read_answer
 
 FOLDER = Path(__file__).parent
@@ -48,7 +49,7 @@ DRAWN_CASES = {
 }
 
 
-def _picture(rows: list, curves: dict, path: Path = FOLDER / "failure.svg") -> Path:
+def _picture(rows: list, curves: dict, path: Path) -> None:
     """Plot x2 and the friction force of four methods with exact ones, and the error of Newmark's method."""
     truth = exact("two", np.linspace(0, 20, 2001))
     with drawing(path, (9.6, 6.6), 3, 4) as (figure, axes):
@@ -94,10 +95,9 @@ def _picture(rows: list, curves: dict, path: Path = FOLDER / "failure.svg") -> P
             axis.set_title(title, fontsize=10)
             axis.legend(title="v", fontsize=9, title_fontsize=9)
         last[0].set_ylabel("|error of the peak|")
-    return path
 
 
-def main(draw: bool = True) -> tuple:
+def main(path: Path | None = FOLDER / "failure.svg") -> tuple:
     """Print the rows of all methods and the errors of Newmark's method, and return both."""
     rows = [solve(*case) for case in CASES]
     print("Fig 16, mass 2 may move from t = 8.0797 on, |F| <= 3")
@@ -118,11 +118,11 @@ def main(draw: bool = True) -> tuple:
             f"  stick speed {speed:g}{' and force' if by_force else '':10} "
             + "  ".join(f"{error:+.1e}" for error in errors)
         )
-    if draw:
-        _picture(rows, curves)
+    if path is not None:
+        _picture(rows, curves, path)
     print(ANSWER)
     return rows, curves
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -24,7 +24,7 @@ The rows of CVODE and Siconos are those of version 1.10, whose `sundials_child.p
 
 Run: python studies/integrators/work_precision.py            (the block once)
      python studies/integrators/work_precision.py --full     (all, three turns; writes the table and the picture)
-     python studies/integrators/work_precision.py draw       (the picture again from the measured table)
+     python studies/integrators/work_precision.py --draw     (the picture again from the saved table)
 """
 
 import json
@@ -38,8 +38,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from engine_problems import ALL
 from engines import OURS
-from measuring import run
 from precision_rows import EQUAL, FLOOR, curve, measure, ratios
+from study_run import Option, run_study
 
 FOLDER = Path(__file__).parent
 TABLE = FOLDER / "work_precision.json"
@@ -131,11 +131,31 @@ def main(names=ALL, ours=OURS, repeats: int = 3, path: Path | None = TABLE) -> d
     return table
 
 
+def measure_or_draw(
+    *, full: bool = False, draw: bool = False, path: Path = FOLDER / "work_precision.svg"
+) -> None:
+    """Measure the block once, or everything, or draw the saved table.
+
+    Parameters
+    ----------
+    full : bool
+        Measure all problems in three turns, and draw them.
+    draw : bool
+        Draw the saved table.
+    path : Path
+        File of the picture.
+    """
+    if draw:
+        picture(json.loads(TABLE.read_text("utf-8")), path)
+    elif full:
+        picture(main(path=path.with_name(TABLE.name)), path)
+    else:
+        main(("block",), repeats=1, path=None)
+
+
 if __name__ == "__main__":
-    if sys.argv[1:] == ["draw"]:
-        picture(json.loads(TABLE.read_text()))
-        raise SystemExit(0)
-    full = "--full" in sys.argv[1:]
-    raise SystemExit(
-        run(lambda: picture(main()) if full else main(("block",), repeats=1, path=None))
+    run_study(
+        measure_or_draw,
+        full=Option(False, "all problems, three turns, with table and picture"),
+        draw=Option(False, "the picture of the saved table"),
     )

@@ -7,10 +7,9 @@ tilt alone, 187 with the roll alone and 172 with both; the work of a cycle of 1 
 The pieces are those of the rig under 26 lbf, pressed over the whole face ([contact.area], 128 cells along each side), with
 Coulomb friction of 0.3 and elastic shear. The errors are below 3 % of each number.
 
-Run: python studies/misalignment/both_tilts.py [--out FOLDER]   (20 s of CPU)
+Run: python studies/misalignment/both_tilts.py
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -20,6 +19,7 @@ import patchfem as pf
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
+from study_run import run_study
 
 FOLDER = Path(__file__).parent
 ANGLES = (0.0, 0.025, 0.05, 0.075, 0.1)  # [mrad] both tilts
@@ -115,11 +115,8 @@ def draw(maps: dict, path: Path, angles=ANGLES) -> Path:
     return path
 
 
-def main(words=None) -> dict:
+def main(path: Path = FOLDER / "both_tilts.svg") -> dict:
     """Print the table, draw the picture and return the maps."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--out", type=Path, default=FOLDER, help="folder of both_tilts.svg")
-    options = parser.parse_args(words)
     maps = run_map()
     print(f"{'tilt':>6} {'roll':>6} {'contact':>8} {'N/um':>6} {'work uJ':>8}")
     for row, column in np.ndindex(maps["work"].shape):
@@ -128,9 +125,9 @@ def main(words=None) -> dict:
             f"{ANGLES[row]:6.3f} {ANGLES[column]:6.3f} {case['contact']:8.3f} {1e-6 * case['stiffness']:6.1f} "
             f"{1e6 * case['work']:8.2f}"
         )
-    print(draw(maps, options.out / "both_tilts.svg"))
+    draw(maps, path)
     return maps
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

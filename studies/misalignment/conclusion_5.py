@@ -33,8 +33,10 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import tilted
 from scipy.optimize import brentq
+from study_run import run_study
 
 from patchfem.runs.patch.press import solve_patch_contact
 
@@ -126,10 +128,15 @@ def main(
     return out
 
 
-if __name__ == "__main__":
-    found = main()
+def print_all() -> None:
+    """Print the misalignments of every portion, and those at the rocking mode."""
+    main()
     print(
         f"rocking at 73 Hz: {ROCKING:.0f} N m/rad: half at",
         {skin: round(1e3 * neutral(0.5, skin, ROCKING), 2) for skin in tilted.SKINS},
         "mrad",
     )
+
+
+if __name__ == "__main__":
+    run_study(print_all)

@@ -25,7 +25,9 @@ from pathlib import Path
 from scipy.optimize import bisect
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import tilted
+from study_run import run_study
 
 from patchfem.core import Measure
 from patchfem.runs.patch.press import solve_patch_contact
@@ -121,10 +123,15 @@ def main(tilts=tilted.TILTS, springs=SPRINGS, offsets=OFFSETS) -> dict:
     return out
 
 
-if __name__ == "__main__":
+def print_all() -> None:
+    """Print the measures of every fixture, and the tilts at which half and a fifth are in contact."""
     main()
     for spring in SPRINGS:
         print(
             spring,
             f"half contact at {tilt_for(0.5, spring):.2e} rad, a fifth at {tilt_for(0.2, spring):.2e} rad",
         )
+
+
+if __name__ == "__main__":
+    run_study(print_all)

@@ -27,14 +27,15 @@ Run: python studies/misalignment/in_motion.py [--full]   (up to 40 s of CPU: 4 o
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import numpy as np
 from scipy.constants import lbf as LBF
+from study_run import Option, run_study
 
 import patchfem as pf
 from patchfem.core import G_N as G
 
 FOLDER = Path(__file__).parent
-sys.path.insert(0, str(FOLDER.parent / "common"))
 RIG = FOLDER.parent / "rig" / "rig.toml"
 TILTS = tuple(10.0 ** np.linspace(-6, -2, 9))  # [rad] tilts
 LOADS = (13.0, 26.0, 52.0)  # [lbf] contact loads
@@ -175,12 +176,12 @@ def main(tilts=TILTS, loads=LOADS, levels=LEVELS):
     return found
 
 
-if __name__ == "__main__":
-    full = "--full" in sys.argv[1:]
+def print_all(*, full: bool = False, path: Path = FOLDER / "in_motion.svg") -> None:
+    """Print the tables, onsets and allowed tilts of four tilts, or of all; draw the maps of all."""
     asked = TILTS if full else tuple(TILTS[k] for k in (0, 3, 4, 8))
-    swept_over = main(asked)
+    found = main(asked)
     if full:
-        picture(swept_over)
+        picture(found, path)
     for lbf in LOADS:
         print(
             f"{lbf:.0f} lbf: onset "
@@ -190,3 +191,7 @@ if __name__ == "__main__":
     for g in LEVELS:
         print(f"26 lbf, {g:g} g: {allowed_tilt(26.0, g, asked)}")
     print("yaw " + ", ".join(f"{1e6 * yaw:.2f}" for yaw in _yaws(asked)) + " um")
+
+
+if __name__ == "__main__":
+    run_study(print_all, full=Option(False, "all tilts, and the picture"))

@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import fixtures
 import tilted
 from drawing import BLUE, GREY, ORANGE, drawing
+from study_run import run_study
 
 from patchfem.runs.patch.press import solve_patch_contact
 
@@ -63,4 +64,4 @@ def main(path: Path = FOLDER / "misalignment.svg", tilts=TILTS) -> Path:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

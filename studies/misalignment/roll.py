@@ -7,10 +7,14 @@ and 183 N mm; 1e-3 rad 6.23 mm and 216 N mm, nearly the mu N b/2 = 220 N mm of o
 
 The pressure is that of blocks with four free sides ([contact.area]); its errors are below 1 %.
 
-Run: python studies/misalignment/roll.py   (10 s of CPU)
+Run: python studies/misalignment/roll.py
 """
 
-import argparse
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from study_run import run_study
 
 import patchfem as pf
 
@@ -50,9 +54,8 @@ def find_roll(centre: float, skin: str, cells: int = 64) -> float:
     return 10 ** brentq(find_excess, -6, -3, xtol=1e-3)
 
 
-def main(words=None) -> dict:
+def main() -> dict:
     """Print and return {(skin, roll): centre as a Measure}."""
-    argparse.ArgumentParser(description=__doc__.partition("\n")[0]).parse_args(words)
     centres = {}
     for skin in SKINS:
         for roll in ROLLS:
@@ -65,4 +68,4 @@ def main(words=None) -> dict:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

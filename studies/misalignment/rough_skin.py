@@ -32,10 +32,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import asperities
 import contact_forms as exact
 import tilted
 from asperities import MEAN
+from study_run import Option, run_study
 
 from patchfem.contact import Holders, press_patch
 from patchfem.core import Compliance
@@ -95,12 +97,14 @@ def main(scatters=SCATTERS, shapes=SHAPES, **how) -> dict:
     return out
 
 
-if __name__ == "__main__":
-    main(
-        SCATTERS if "--full" in sys.argv[1:] else tuple(SCATTERS[k] for k in (0, 3, 5)),
-        points=2**18,
-    )
+def print_all(*, full: bool = False) -> None:
+    """Print the rows of three scatters, or of all six, and the opening tilts of layers."""
+    main(SCATTERS if full else tuple(SCATTERS[k] for k in (0, 3, 5)), points=2**18)
     print(f"bare pieces open at {opening(None):.3e} rad")
     for k in STIFFNESSES:
         rigid = exact.wedge_opening_tilt(MEAN * 12.7e-3**2, 12.7e-3, 12.7e-3, k)
         print(f"k_n {k:.1e} Pa/m: {opening(k):.3e} rad; rigid pieces {rigid:.3e} rad")
+
+
+if __name__ == "__main__":
+    run_study(print_all, full=Option(False, "all six scatters"))

@@ -22,8 +22,10 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import fixtures
 import tilted
+from study_run import run_study
 
 SPRING = 1e3  # [N m/rad] rotational stiffness of the fixture
 OFFSETS = (1 / 6, 0.25, 1 / 3, 0.4, 0.45)
@@ -56,4 +58,4 @@ def main(tilts=tilted.TILTS, skins=tuple(tilted.SKINS), offsets=OFFSETS) -> dict
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

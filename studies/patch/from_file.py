@@ -15,10 +15,13 @@ absolute difference of both pressures, over that of one.
 Run: python studies/patch/from_file.py
 """
 
+import sys
 import tempfile
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import numpy as np
+from study_run import run_study
 
 import patchfem as pf
 
@@ -75,6 +78,11 @@ def rows():
         yield tilt, pairs, 100 * pressure_difference(made, read)
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Print the rows."""
     for name, compared, apart in rows():
         print(f"{name:10}", *(f"{off:7.2f} | {bar:.2g}" for off, bar in compared), f"{apart:7.2f}")
+
+
+if __name__ == "__main__":
+    run_study(main)

@@ -25,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import figure_5
 import figure_27
 from figures_2_3 import STICK_SPEED, exact_cycle, newmark_run
+from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
@@ -268,4 +269,4 @@ def main(path: Path | None = FOLDER / "conclusions.md") -> list:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -35,6 +35,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from figure_27 import scene
 from modal_test import RATE, G, fit_mode, h1, run_random_test
+from study_run import run_study
 from study_text import read_answer
 
 FOLDER = Path(__file__).parent
@@ -236,4 +237,4 @@ def main(path: Path | None = FOLDER / "engaged.svg") -> tuple:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

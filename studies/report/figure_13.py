@@ -20,6 +20,7 @@ from scipy.special import gammaincinv
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from friction_forms import weight_along
+from study_run import run_study
 from study_text import read_answer
 
 FOLDER = Path(__file__).parent
@@ -78,4 +79,4 @@ def draw(path: Path, x) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -20,6 +20,7 @@ from scipy.integrate import quad
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, drawing
 from friction_forms import weight_across
+from study_run import run_study
 from study_text import read_answer
 
 FOLDER = Path(__file__).parent
@@ -53,4 +54,4 @@ def main(path: Path | None = FOLDER / "figure_14.svg") -> list:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

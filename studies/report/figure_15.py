@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from problems import UNDAMPED_MASS
 from report_methods import coulomb, solve_duhamel
+from study_run import run_study
 from study_text import read_answer
 from vibration_forms import decay
 
@@ -161,4 +162,4 @@ def main(path: Path | None = FOLDER / "figure_15.svg") -> tuple:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -25,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from modal_test import Estimate, fit_mode, h1, run_random_test
+from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
@@ -144,4 +145,4 @@ def main(path: Path | None = FOLDER / "figure_26.svg") -> tuple:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

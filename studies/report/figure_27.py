@@ -31,6 +31,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from modal_test import Estimate, G, fit_mode, h1, run_random_test
+from study_run import run_study
 from study_text import read_answer
 
 FOLDER = Path(__file__).parent
@@ -164,4 +165,4 @@ def main(path: Path | None = FOLDER / "figure_27.svg", cases=CASES, seconds: flo
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

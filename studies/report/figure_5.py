@@ -26,6 +26,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from report_methods import solve_euler
+from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
@@ -182,4 +183,4 @@ def main(steps=STEPS, path: Path | None = FOLDER / "figure_5.svg") -> tuple:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -31,6 +31,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from steady_loops import HOLD, write_with_run_in
+from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
@@ -210,4 +211,4 @@ def main(path: Path | None = FOLDER / "figure_8.svg", frequencies=FREQUENCIES) -
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -22,6 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, ORANGE, drawing
+from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
@@ -151,4 +152,4 @@ def main(beside=OTHER_RATIOS, path: Path | None = FOLDER / "figures_10_12.svg") 
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
+from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
@@ -155,4 +156,4 @@ def main(path: Path | None = FOLDER / "figures_28_29.svg", cases=CASES) -> list:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

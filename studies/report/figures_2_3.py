@@ -29,6 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from problems import SDOF, SDOF_DRIVE, make_coulomb, sample_motion
 from report_methods import coulomb, solve_newmark
+from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
@@ -226,4 +227,4 @@ def main(path: Path | None = FOLDER / "figures_2_3.svg") -> tuple:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -38,6 +38,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "wear"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import bands
 from drawing import drawing
+from study_run import run_study
 from study_text import read_answer
 
 from patchfem.core import frozen_array
@@ -196,19 +197,6 @@ def picture(sets: list, path: Path) -> Path:
     return path
 
 
-def write(one: Set, folder: Path) -> list:
-    """Write the four traces of a set as CSV files that `patchfem profile` and `patchfem compare` read."""
-    out = []
-    for pair, way in zip(one.traces, "xy"):
-        for each, when in zip(pair, ("before", "after")):
-            out.append(folder / f"{when}_{way}.csv")
-            columns = np.column_stack([each.x - each.x.mean(), each.z]) / UM
-            np.savetxt(
-                out[-1], columns, fmt="%.6f", delimiter=",", header="x [um],z [um]", comments=""
-            )
-    return out
-
-
 def main(
     strokes=STROKES, count: int = SETS, path: Path | None = FOLDER / "figures_30_31.svg"
 ) -> dict:
@@ -246,6 +234,4 @@ def main(
 
 
 if __name__ == "__main__":
-    result = main()
-    if len(sys.argv) > 1:
-        write(middle(result[STROKES[0]][0]), Path(sys.argv[1]))
+    run_study(main)

@@ -8,8 +8,12 @@ whether the report itself is right an item's study says. Paths are those of the 
 Run: python studies/report/items.py
 """
 
+import sys
 from pathlib import Path
 from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from study_run import run_study
 
 FOLDER = Path(__file__).parent
 VERDICT_TEXTS = {"nothing": "nothing to compute"}
@@ -665,4 +669,4 @@ def main(path: Path | None = FOLDER / "items.md") -> tuple:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

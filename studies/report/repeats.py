@@ -22,7 +22,7 @@ by 26 % (of the logarithm, as all changes here): the model's falls by 6.4 %. At 
 the model's falls by 1.8 %. So what makes the repeats differ is for the most part neither wear nor the friction that the
 onset shows. A mesh three times as fine with two jumps a level moves no change by wear alone by more than 0.25 %.
 
-Run: python studies/report/repeats.py [coefficient in m2/N ...]      (1e-14)
+Run: python studies/report/repeats.py
 """
 
 import sys
@@ -33,6 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from study_run import run_study
 from study_text import read_answer
 
 from patchfem.export import netcdf, runs
@@ -212,4 +213,4 @@ def main(coefficients=(COEFFICIENT,)) -> dict:
 
 
 if __name__ == "__main__":
-    main([float(word) for word in sys.argv[1:]] or (COEFFICIENT,))
+    run_study(main)

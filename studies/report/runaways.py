@@ -33,6 +33,7 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
+from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
@@ -220,4 +221,4 @@ def picture(rows: list, path: Path) -> Path:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -30,6 +30,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from figure_27 import POINT
 from modal_test import march_samples
+from study_run import run_study
 from study_text import read_answer
 
 from patchfem.campaigns.fits.request import FitOptions, fit_measurement
@@ -231,4 +232,4 @@ def format_score(score: dict) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -27,6 +27,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from modal_test import march_samples
+from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
@@ -189,4 +190,4 @@ def main(path: Path | None = FOLDER / "sweeps.svg", models=tuple(MODELS)) -> lis
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -10,6 +10,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
+from study_run import run_study
 
 from patchfem.core import G_N
 from patchfem.inputs import read_table
@@ -55,4 +56,4 @@ def main(path: Path = FOLDER / "rig.svg") -> Path:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -18,6 +18,7 @@ from time import process_time
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, ORANGE, drawing
+from study_run import run_study
 
 from patchfem.runs import run as runner
 from patchfem.scene import scene
@@ -89,4 +90,4 @@ def main(cycles: float = 200, path: Path | None = FOLDER / "readings.svg") -> di
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

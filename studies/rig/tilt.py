@@ -7,15 +7,19 @@ slip begins change by 6 and 8 % at 0.03 mrad; the pressure peak doubles at 0.011
 A tilt of 0.1 mrad leaves 22 % of the patch in contact and 1 mrad 2.4 %. The patch's shear stiffness falls from 4.039e8
 to 2.291e8 and 1.198e8 N/m, and half of the friction has given way after 95, 218 and 337 nm of slide: always far below
 the micrometre of the bonds and the micrometres of the motion. So the rig at 5 g hardly notices: its amplitude falls
+import sys
 from 15.32 ± 0.07 um to 14.807 ± 0.023 and 14.24 ± 0.07 um, its loop area from 2.043 ± 0.012 mJ to 1.962 ± 0.003 and
 1.871 ± 0.010 mJ.
 
 Run: python studies/rig/tilt.py
 """
 
+import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import numpy as np
+from study_run import run_study
 
 import patchfem as pf
 from patchfem.runs import run as runner
@@ -80,6 +84,11 @@ def allowed_tilt(tilts="1e-6 rad..1e-3 rad:7") -> str:
     return pf.sweep(FOLDER / "rig.toml", {"contact.tilt.angle": tilts}).attrs["verdict"]
 
 
-if __name__ == "__main__":
+def print_all() -> None:
+    """Print the rows and the tilt that is allowed."""
     main()
     print(allowed_tilt())
+
+
+if __name__ == "__main__":
+    run_study(print_all)

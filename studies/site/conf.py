@@ -36,7 +36,7 @@ include_patterns = [
     "patchfem/*.md",
     "patchfem/scene/*.md",
     "patchfem/scene/guide/*.md",
-    "studies/README.md",
+    "studies/*.md",
     "studies/*/README.md",
     "studies/report/*.md",
     "studies/notebooks/*.ipynb",

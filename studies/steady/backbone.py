@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import steady_pictures
 from rig_texts import ONE_MODE, TEXTS
+from study_run import run_study
 
 from patchfem.hybrid.free_motions import FreeMotions
 from patchfem.model import build
@@ -120,4 +121,4 @@ def main(names=tuple(CASES), path: Path | None = FOLDER / "backbone.svg", **how)
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import steady_pictures
 from fold_sweeps import HIGH_END, LOW_END, at_rest, curve, sweep
+from study_run import run_study
 
 FOLDER = Path(__file__).parent
 RATES = (0.4, 0.1, 0.025)  # [Hz/s] sweep rates
@@ -47,4 +48,4 @@ def main(rates=RATES, path: Path | None = FOLDER / "fold.svg", **how) -> tuple:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -13,8 +13,8 @@ model that was run beats that null.
 The recipe, which models, free keys with their ends, starts, readings and protocols, stands in `rungs.py` and was fixed
 before any of these scores was computed. What was computed is kept in scores.json, and README.md has the whole table.
 
-Run: python studies/table_1/ladder.py [minutes]; with minutes it fits for so long what the recipe has and scores.json
-has not.
+Run: python studies/table_1/ladder.py [--minutes M]; with minutes it fits for so long what the recipe has
+and scores.json has not.
 """
 
 import sys
@@ -22,8 +22,10 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from fitting import fit_rung, keep, read_records
 from rungs import variants
+from study_run import Option, run_study
 from table import tables
 
 
@@ -48,4 +50,6 @@ def main(minutes: float = 0.0) -> dict:
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 0.0)
+    run_study(
+        main, minutes=Option(0.0, "time for fits that scores.json has not; it then gets them [min]")
+    )

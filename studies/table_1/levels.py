@@ -22,7 +22,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from rungs import FOLDER, ROOT2, RUNGS, STUCK_READING
+from study_run import run_study
 
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N
@@ -112,4 +114,4 @@ def main(shown=SHOWN_MODELS, frequencies=FREQUENCIES) -> list:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

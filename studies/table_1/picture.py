@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from fitting import read_records
 from rungs import FOLDER, ROOT2, STUCK_READING, TABLE
+from study_run import run_study
 
 from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.core import G_N
@@ -90,4 +91,4 @@ def _panel(panel, rows: dict, cells, frequency: float, what: int, unit: float) -
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -7,7 +7,7 @@ score is the root mean square of ln(computed/measured). The four numbers are the
 of the second path, and how far the friction lies off the axis; the factor of the accelerometer, 1.2375, is read off the
 readings at 143 Hz and 4 g. A point in place of the patch, elastic over 0.243 um, does the same: 0.063, then 0.186.
 
-Run: python studies/table_1/second_path.py [starts]
+Run: python studies/table_1/second_path.py [--starts N]
 """
 
 import sys
@@ -17,8 +17,10 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from null_models import fit_null_model
 from rungs import PREDICTED_ROWS, STUCK_READING, Rung
+from study_run import Option, run_study
 
 from patchfem.campaigns.fits.request import FitOptions, fit_measurement
 from patchfem.campaigns.rows.cells import compute_rms_scores
@@ -77,4 +79,4 @@ def main(starts: int = 8) -> dict:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 8)
+    run_study(main, starts=Option(8, "random starts of the fit"))

@@ -12,10 +12,12 @@ from textwrap import fill
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from fitting import KIND, better, intervals, read_records, training
 from fitting import NULLS as RIVALS
 from null_models import NULL_MODELS, fit_null_model
 from rungs import FOLDER, PROTOCOLS, ROOT2, RUNGS, STUCK_READING, TABLE, variants
+from study_run import run_study
 
 from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 
@@ -448,7 +450,7 @@ def parts(rows: dict) -> dict:
 
 def main(path: Path = FOLDER / "README.md") -> str:
     """Write every table between its marks in README.md, and return the text."""
-    text = path.read_text("utf-8")
+    text = (FOLDER / "README.md").read_text("utf-8")
     for name, lines in parts(read_records()).items():
         before, _, rest = text.partition(MARK.format(name) + "\n")
         text = (
@@ -461,4 +463,4 @@ def main(path: Path = FOLDER / "README.md") -> str:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

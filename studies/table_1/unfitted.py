@@ -6,7 +6,7 @@ is still stuck. From 6 g both run away to tens and hundreds of times what was me
 accelerations 1.62 (Coulomb) and 1.62 (patch), of the displacements 3.68 and 3.37. Saying "1.43 times the input" scores
 0.12.
 
-Run: python studies/table_1/unfitted.py [cycles]
+Run: python studies/table_1/unfitted.py [--cycles N]
 """
 
 import sys
@@ -16,6 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from rig_texts import TEXTS
+from study_run import Option, run_study
 
 from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 from patchfem.core import G_N
@@ -82,4 +83,4 @@ def main(cycles: float = 800, models=("coulomb", "patch")) -> dict:
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 800)
+    run_study(main, cycles=Option(800.0, "cycles of a run"))

@@ -26,6 +26,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
 from rubbing import periodic_amplitude, rub
+from study_run import run_study
 from synthetic import report_area
 
 FOLDER = Path(__file__).parent
@@ -208,4 +209,4 @@ def main(
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -24,6 +24,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import BLUE, GREY, ORANGE, drawing
+from study_run import run_study
 
 from patchfem.core import G_N
 from patchfem.model import build
@@ -170,4 +171,4 @@ def main(
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

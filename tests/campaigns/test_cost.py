@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from command_line import run_cli
 from scene_texts import PIECE
@@ -10,10 +11,11 @@ import patchfem as pf
 from patchfem import build
 from patchfem.campaigns import (
     Cost,
-    compute_setting_costs,
+    compute_costs,
     describe_best_setting,
     numerical_settings,
 )
+from patchfem.campaigns.convergence import find_order, find_sufficient_run, measure_convergence
 from patchfem.core import Measure
 from patchfem.export.costs import make_answer
 from patchfem.export.show import make_lines
@@ -59,7 +61,9 @@ def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch)
     monkeypatch.setattr(numerical_settings, "CELL_COUNT_FACTORS", (0.25, 1.0))
     patch = build_model(keys, 0.03)
     # The label of a row lists all settings with equal runs.
-    row = next(one for one in compute_setting_costs(patch, "element_size") if own in one.label)
+    row = next(
+        one for one in compute_costs(patch, "element_size")["element_size"] if own in one.label
+    )
     measures = run(patch, fresh=True).measures
     assert row.measures.keys() == measures.keys()
     for name, measure in measures.items():
@@ -70,7 +74,7 @@ def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch)
 def test_exact_summary_states_coarsest_sufficient_run_or_worst_measure():
     """The summary states the coarsest run within the tolerance, or else the measure with the largest error."""
     runs = [make_cost("2", 1, 4e-2), make_cost("4", 2, 8e-3), make_cost("8", 5, 2e-3)]
-    within = "a knob at 4: 2 CPU s per run, with every measure within the tolerance 0.01"
+    within = "a knob at 4: 2 CPU s per run, with every measure that has an error estimate within the tolerance 0.01"
     assert describe_best_setting(runs, 1e-2) == within
     assert describe_best_setting(runs, 1e-3) == (
         "no setting is known to meet the tolerance 0.001: the best run, with a knob at 8, has an error of 0.002 in a and "
@@ -113,6 +117,58 @@ def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
     assert answer.verdict[1:] == ("No run is known to meet its tolerance.",)
     # the advice of a tolerance other than that of the scene
     assert answer.remarks.notes == ("With a knob at 5, b misses the tolerance: use it.",)
+
+
+def make_series(order, n_runs=5):
+    """Return runs with 10, 20, 40, ... steps whose measure "a" approaches 2 with an order and states its error."""
+    runs = []
+    for steps in 10 * 2 ** np.arange(n_runs):
+        error = 3.0 * steps**-order
+        measures = {"loop_area": Measure(2.0 + error, "J", 1.1 * error)}
+        runs.append(Cost(f"{steps}", float(steps), f"{steps} steps", steps / 100, 1.0, 3, measures))
+    return runs
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 1.7, 4.0])
+def test_exact_order_of_power_is_observed(order):
+    """Values 2 + 3 n^-p have the order p to 1e-8, and the coarsest run within a tolerance follows from 3 n^-p."""
+    runs = make_series(order)
+    found = measure_convergence(runs, "steps_per_cycle", "loop_area")
+    assert found.order == pytest.approx(order, rel=1e-8)
+    changes = [
+        abs(run.measures["loop_area"].value / runs[-1].measures["loop_area"].value - 1)
+        for run in runs
+    ]
+    assert found.changes == pytest.approx(changes, abs=1e-15)
+    sufficient = find_sufficient_run(runs, "loop_area", found, 1e-2)
+    fits = [
+        run for run in runs if 3.3 * run.value**-order <= 1e-2 * run.measures["loop_area"].value
+    ]
+    assert sufficient is (fits[0] if fits else None)
+
+
+def test_exact_values_without_a_limit_have_no_order():
+    """Values that swing, that move apart or that are equal to round-off have no order."""
+    sizes = np.array([4.0, 2.0, 1.0])
+    assert find_order(sizes, np.array([1.0, 2.0, 1.5])) is None
+    assert find_order(sizes, np.array([1.0, 1.1, 1.3])) is None
+    runs = make_series(1.0, 3)
+    for k, one in enumerate(runs):
+        one.measures["loop_area"] = Measure(1.0 + 1e-14 * 2.0**-k, "J", 0.0)
+    assert measure_convergence(runs, "steps_per_cycle", "loop_area").order is None
+
+
+def test_exact_answer_states_when_a_run_takes_a_minute():
+    """CPU times of 1 and 4 s at 1e-2 and 1e-4 grow as tolerance^-.301, so that a minute is taken near 1e-8."""
+    runs = [
+        replace(make_cost(label, seconds, 1e-9), tolerance=float(label))
+        for label, seconds in (("0.01", 1.0), ("0.0001", 4.0))
+    ]
+    sentence = make_answer({"tolerance": runs}, build_model(tolerance=0.01)).verdict[2]
+    expected = 1e-4 * 15 ** (-np.log(100) / np.log(4))
+    assert sentence.endswith(
+        f"a run takes a minute at a tolerance of {expected:.0e}.".replace("e-0", "e-")
+    )
 
 
 @pytest.mark.parametrize(

@@ -224,8 +224,8 @@ SUPPORTED = {
     ),
     "grooves and load": (
         POINT + AMPLITUDE_OF_LOAD + GROOVES.format("normal") + "{}" + RIG,
-        2000,
-        ("coulomb", "tanh"),
+        4000,
+        ("coulomb", "tanh", "elastic-plastic", "nonlocal", "iwan"),
     ),
     "grooves, shear and holder": (
         PATCH
@@ -249,8 +249,8 @@ SUPPORTED = {
     ),
     "bench with grooves and load": (
         POINT + AMPLITUDE_OF_LOAD + GROOVES.format("normal") + "{}" + BENCH,
-        2000,
-        ("coulomb", "tanh"),
+        4000,
+        ("coulomb", "tanh", "stiffness", "bouc-wen", "lugre"),
     ),
     "bench with shear": (
         PATCH + SHEAR + "{}" + BENCH,

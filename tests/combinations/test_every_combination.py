@@ -27,12 +27,14 @@ LAWS = {
 EFFECTS = (
     "shear",
     "yaw",
+    "shear and yaw",
     "lower",
     "load",
     "pitch",
     "shear and pitch",
     "grooves",
     "shear and grooves",
+    "load and grooves",
     "cubic spring",
     "interfaces",
     "shear of interfaces",
@@ -41,6 +43,7 @@ EFFECTS = (
     "bench with lower",
     "bench with load",
     "bench with grooves",
+    "bench with load and grooves",
 )
 # A patch so long that its slide over the pressure of the lower piece is small
 LONG = {'length = "12.7 mm"': 'length = "127 mm"', '"1.2 mm"': '"12 mm"', '"10 m"': '"1000 m"'}
@@ -120,6 +123,9 @@ def make_scenes(effect: str, law: str) -> tuple[str, str, str]:
         "yaw": (
             area + yawing.format(20), area + yawing.format(1e-6), area + RIG
         ),
+        "shear and yaw": (
+            area + SHEAR + yawing.format(20), area + SHEAR + yawing.format(1e-6), area + SHEAR + RIG
+        ),
         "lower": (lower + friction + RIG, long_lower + friction + RIG, long + friction + RIG),
         "load": (
             POINT + OSCILLATING.format("60 N") + friction + RIG,
@@ -141,6 +147,11 @@ def make_scenes(effect: str, law: str) -> tuple[str, str, str]:
             STEEL + SHEAR + CARVED.format("contact", "1 um") + friction + RIG,
             STIFF + SHEAR + CARVED.format("contact", "1e-6 um") + friction + RIG,
             patch + RIG,
+        ),
+        "load and grooves": (
+            POINT + OSCILLATING.format("60 N") + CARVED.format("normal", "1 um") + friction + RIG,
+            POINT + OSCILLATING.format("1e-6 N") + CARVED.format("normal", "1 um") + friction + RIG,
+            POINT + CARVED.format("normal", "1 um") + friction + RIG,
         ),
         "cubic spring": (
             point + RIG.replace("[drive]", cubic.format(1e15)),
@@ -174,6 +185,11 @@ def make_scenes(effect: str, law: str) -> tuple[str, str, str]:
             POINT + CARVED.format("normal", "1e-6 um") + friction + BENCH,
             point + BENCH,
         ),
+        "bench with load and grooves": (
+            POINT + OSCILLATING.format("60 N") + CARVED.format("normal", "1 um") + friction + BENCH,
+            POINT + OSCILLATING.format("60 N") + CARVED.format("normal", "1e-6 um") + friction + BENCH,
+            POINT + OSCILLATING.format("60 N") + friction + BENCH,
+        ),
     }  # fmt: skip
     # Points that stick rigidly need short steps.
     n_steps = 1600 if law in ("coulomb", "convolution") else 400
@@ -189,6 +205,18 @@ def run_measures(text: str) -> dict:
     """Return the values of the measures of a scene, without error estimates."""
     measures = run_scene(text, estimate=False).measures
     return {name: measure.value for name, measure in measures.items()}
+
+
+def test_stiffness_under_an_approach_has_the_loop_of_the_load():
+    """A law with a stiffness has the same loop under the approach of a load as under the load, also at an interface."""
+    distance = run_measures(STEEL)["approach"]
+    rig = STEEL + "[friction]\nstatic = 0.3\n" + LAWS["stiffness"] + RIG
+    for text in (rig, make_scenes("shear of interfaces", "stiffness")[0]):
+        given = text.replace('load = "116 N"\n', f'approach = {{distance = "{distance!r} m"}}\n')
+        assert given != text
+        assert run_measures(given)["loop_area"] == pytest.approx(
+            run_measures(text)["loop_area"], rel=1e-9
+        )
 
 
 COMBINATIONS = [(effect, law) for effect in EFFECTS for law in LAWS]

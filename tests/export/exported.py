@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from patchfem.export.fields import vtkhdf
-from patchfem.export.fields.blocks import make_blocks
+from patchfem.export.fields.vtkhdf import make_blocks
 from patchfem.runs import PieceFields, Pieces
 
 X = np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3])  # columns of nodes [m]

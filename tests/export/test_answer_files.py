@@ -23,7 +23,7 @@ def make_answer() -> Answer:
     data = {
         "time": Variable(("time",), np.linspace(0, 1, 300), "s", "time"),
         "force": Variable(("time",), generator.normal(size=300), "N", "force"),
-        "mode": Variable(("mode",), np.array(["axial", "größer"]), "", "mode"),
+        "mode": Variable(("mode",), np.array(["axial", "größer"]), "", "mode of the rig"),
         "modal": Variable(("time", "mode"), generator.normal(size=(300, 2)), "m"),
         "status": Variable(
             ("frame", "x"),
@@ -90,6 +90,7 @@ def test_exact_netcdf_equals_that_of_xarray(tmp_path):
         }
     with h5py.File(tmp_path / "ours.nc") as file:
         assert file["force"].attrs["units"] == "N"
+        assert file["mode"].attrs["long_name"] == "mode"
         np.testing.assert_array_equal(file["force"][:], answer.data["force"].values)
 
 

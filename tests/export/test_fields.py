@@ -15,8 +15,7 @@ from vtk_frames import read_with_vtk
 from vtkmodules.vtkCommonCore import vtkDataArray
 
 import patchfem as pf
-from patchfem.export.fields.blocks import VTK_FIELDS
-from patchfem.export.fields.vtkhdf import VTKHDF_FILE, read_frames
+from patchfem.export.fields.vtkhdf import VTK_FIELDS, VTKHDF_FILE, read_frames
 
 PARTS = ["lower", "upper", "interface"]
 MAX_ROUNDING = 1e-6  # relative error of a number in the file
@@ -126,14 +125,16 @@ def test_exact_vtu_agrees_in_meshio(tmp_path):
 
 
 def test_exact_pvd_lists_parts_of_all_frames(tmp_path):
-    """A .pvd is a time series of the parts, each a .vtu with the mesh and the fields of its block."""
+    """A .pvd is a time series of the named parts, each a .vtu with the mesh and the fields of its block."""
     small = write_small_series(tmp_path / "out")
     run_successfully("export", tmp_path / "out", "-o", tmp_path / "a.pvd")
     reader = pyvista.get_reader(tmp_path / "a.pvd")
     assert reader.time_values == list(small.times)
     for number in range(3):
         reader.set_active_time_point(number)
-        for part, grid in zip(PARTS, reader.read(), strict=True):
+        (grids,) = reader.read()
+        assert grids.keys() == list(PARTS)
+        for part, grid in zip(PARTS, grids, strict=True):
             assert_block_equal(grid, small.blocks[part], number)
             assert grid.field_data["TimeValue"][0] == small.times[number]
 

@@ -131,6 +131,8 @@ def test_exact_cost_table_agrees_with_json(folders):
     details = read_json(folders / "cost/cost.json")
     rows = read_rows(folders / "cost", "cost.csv")
     assert list(rows[0])[:5] == ["knob", "setting", "seconds", "wall_seconds", "timings"]
+    rows_of_convergence = details.pop("convergence")
+    assert {row["setting"] for row in rows_of_convergence} == {"steps_per_cycle"}
     runs = [(knob, run) for knob, part in details.items() for run in part["runs"]]
     for row, (knob, run) in zip(rows, runs, strict=True):
         assert (row["knob"], row["setting"]) == (knob, run["label"])

@@ -8,7 +8,7 @@ import pytest
 import patchfem as pf
 from patchfem.export import run_folder
 from patchfem.export.charts import panels
-from patchfem.export.charts.table import CHARTS
+from patchfem.export.rows import CHARTS
 from patchfem.export.runs import make_answer
 from patchfem.model.face import average_over_cells
 from patchfem.surface.areal import Areal

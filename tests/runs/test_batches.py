@@ -1,6 +1,4 @@
-"""Many models solved together, and models on shared meshes, agree with single runs of each model."""
-
-from dataclasses import replace
+"""Many models solved together agree with single runs of each model."""
 
 import numpy as np
 import pytest
@@ -9,11 +7,9 @@ from scene_runs import load_scene
 from scene_texts import (
     BENCH,
     COATED,
-    COATING,
     COULOMB,
     CROWNED_JOINT,
     MODE,
-    PIECE,
     PLASTIC,
     POINT,
     SHEAR,
@@ -23,7 +19,7 @@ from scene_texts import (
 
 import patchfem as pf
 from patchfem.core import PatchfemError
-from patchfem.runs import FAILED_OUTCOME, with_shared_meshes
+from patchfem.runs import FAILED_OUTCOME, solve_with_coarser
 from patchfem.runs.batch import batches, lumped, one_by_one
 from patchfem.runs.patch import store
 
@@ -83,14 +79,12 @@ def solve_single(model):
 
 @pytest.mark.parametrize("kind", TEXTS)
 def test_exact_batch_agrees_with_single_runs(kind):
-    """A batch of each kind of run agrees with single runs of its cases on the same mesh, which share a tilt."""
+    """A batch of each kind of run agrees with single runs of its cases, which share a tilt."""
     sets = {"contact.tilt.angle": 3e-4}
     sets |= {"drive.acceleration": 40.0} if "drive" in TEXTS[kind] else {}
     sets |= {"slide.amplitude": 2e-5} if "bench" in kind else {}
     loads = (50.0, 400.0)
-    models = with_shared_meshes(
-        [pf.build(TEXTS[kind], **sets, **{"contact.load": load}) for load in loads]
-    )
+    models = [pf.build(TEXTS[kind], **sets, **{"contact.load": load}) for load in loads]
     batch = batches.solve_models(models)
     for case, model in enumerate(models):
         assert_equal_case(batch, case, solve_single(model), 1e-12)
@@ -246,74 +240,14 @@ def test_always_internal_fault_of_case_keeps_results_of_others():
     assert "internal fault, please report it: " in results.messages[0]
 
 
-# ---- shared meshes
+# ---- patches of benches
 
-TILTED = PIECE + 'load = "100 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
-BARE_CROWN = PIECE + 'load = "100 N"\nsubstrate = "Ti-8Al-1Mo-1V"\ncrown = {radius = "1 m"}\n'
 LOOP = '[slide]\nkind = "sine"\namplitude = "0.2 um"\nfrequency = "1 Hz"\ncycles = 3\n'
 
 
-def build_family(text: str, changes: str, key: str, values) -> list:
-    """Return models of a scene for several values of a key."""
-    return [pf.build(load_scene(text, f"{changes}; {key}={value}")) for value in values]
-
-
-def test_always_shared_mesh_meets_tolerance_of_every_case():
-    """The mesh is refined until the errors of the worst case are below the tolerance."""
-    cases = build_family(
-        TILTED, "accuracy.tolerance=1e-3", "contact.tilt.angle", ("2e-5 rad", "1e-3 rad")
-    )
-    for case in with_shared_meshes(cases):
-        measures = pf.run(case).measures
-        for measure in (measures["pressure_peak"], measures["normal_stiffness"]):
-            assert measure.error <= 1e-3 * measure.value + measure.floor
-
-
-@pytest.mark.filterwarnings("error")
-def test_always_case_that_fails_keeps_shared_mesh_of_others():
-    """A case that is refused, has its own mesh or tips over does not change the shared mesh of the others."""
-    valid = build_family(
-        TILTED, "accuracy.tolerance=1e-2", "contact.tilt.angle", ("1e-5 rad", "1e-4 rad")
-    )
-    patch = valid[0].patch.with_loading(load=100.0, line_moment=10.0, can_rotate=True)
-    tipping = replace(valid[0], patch=patch)
-    alone = pf.build(load_scene(TILTED, "contact.element_size=0.4 mm"))
-    fault = PatchfemError("a case that was refused")
-    models = with_shared_meshes([*valid, fault, alone, tipping])
-    assert models[2] is fault and models[3].patch.mesh.shared is None
-    (with_others, _), (alone_shared, _) = (
-        case.patch.mesh.shared[0] for case in (models[0], with_shared_meshes(valid)[0])
-    )
-    assert np.array_equal(with_others.points, alone_shared.points)
-    with pytest.raises(PatchfemError, match="tips over"):
-        pf.run(models[4])
-
-
-@pytest.mark.parametrize(
-    "text, tolerance, amplitudes",
-    [
-        (CROWNED_JOINT, 1e-2, ("0.2 um", "10 um")),
-        (BARE_CROWN + SHEAR + COULOMB, 1e-3, ("0.02 um", "0.5 um")),
-    ],
-)
-def test_always_loop_errors_of_sweep_are_close_to_single_runs(text, tolerance, amplitudes):
-    """On a shared mesh the error of the loop area is at most 1.5 times that of a single run, and the values agree."""
-    changes = f"accuracy.tolerance={tolerance}"
-    cases = build_family(text + LOOP, changes, "slide.amplitude", amplitudes)
-    for pair in zip(cases, with_shared_meshes(cases), strict=True):
-        single, shared = (pf.run(case).measures["loop_area"] for case in pair)
-        assert shared.error <= 1.5 * single.error
-        assert abs(shared.value - single.value) <= shared.error + single.error
-
-
-def test_always_shared_mesh_resolves_zones_of_slip_of_every_case():
-    """The mesh of a sweep over the slide resolves the friction work of small slides too, whose zones of slip are short.
-
-    On the mesh that the static measures need, the loop area of a small slide misses the tolerance.
-    """
-    tilted = TILTED + '[contact.tilt]\nangle = "1e-4 rad"\n' + SHEAR + COULOMB + LOOP
-    amplitudes = ("0.03 um", "0.06 um", "0.1 um", "0.4 um")
-    cases = build_family(tilted, "accuracy.tolerance=1e-2", "slide.amplitude", amplitudes)
-    for amplitude, case in zip(amplitudes, with_shared_meshes(cases), strict=True):
-        assert case.patch.mesh.shared is not None
-        assert pf.run(case).measures["loop_area"].error_ratio(1e-2) <= 1, amplitude
+def test_exact_benches_with_equal_patches_press_them_once():
+    """Cases that differ in the slide alone have the patch of the first one; a case with another load has its own."""
+    changes = ("slide.cycles=3", "slide.cycles=4", "contact.load=50 N")
+    models = [pf.build(load_scene(CROWNED_JOINT + LOOP, change)) for change in changes]
+    first, same, other = (solve_with_coarser(model.patch, 1e-2) for model in models)
+    assert first is same and first is not other

@@ -43,3 +43,21 @@ def test_exact_peak_of_stuck_damper_agrees_with_receptance():
     frequency = measures["peak_frequency"]
     assert abs(amplitude.value + reference.fun) <= amplitude.error < 1e-6 * amplitude.value
     assert abs(frequency.value - reference.x) <= frequency.error < 1e-2
+
+
+def test_peak_of_sweep_case_agrees_with_drawn_curve():
+    """Random dampers, whose peaks a sweep finds without their curves, have the peaks of the runs that draw them, within both
+    errors. At 3 kN the highest motions rise above a curve that sticks."""
+    text = read_template("damper")
+    scene = text[: text.index("\n[sweep]")] + text[text.index("\n[accuracy]") :]
+    draws = np.random.default_rng(71_000_100)
+    key = "structure.interface[1]"
+    for load in ("50 N", "300 N", "3 kN"):
+        values = {f"{key}.static": float(draws.uniform(0.2, 0.6)), f"{key}.load": load}
+        values[f"{key}.stiffness"] = f"{float(draws.uniform(49, 91))} N/um"
+        drawn = pf.run(scene, **values).measures
+        cases = pf.run_many(pf.load(scene, **values))
+        for name in (*MAIN_MEASURES[:-1], "peak_frequency"):
+            one = drawn[name]
+            difference = abs(one.value - cases.values[name][0])
+            assert difference <= one.error + cases.errors[name][0], (load, name)

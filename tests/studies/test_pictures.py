@@ -37,6 +37,7 @@ def test_always_picture_is_legible_and_without_code_names(name):
 
 
 def test_always_gallery_shows_every_picture_once():
-    """README.md shows every picture of the repository once."""
-    links = re.findall(r"!\[[^\]]+\]\(([^)]+\.svg)\)", (ROOT / "README.md").read_text("utf-8"))
+    """The page of pictures shows every picture of the repository once."""
+    text = (ROOT / "pictures.md").read_text("utf-8")
+    links = re.findall(r"!\[[^\]]+\]\(([^)]+\.svg)\)", text)
     assert sorted(set(links)) == PICTURES and len(links) == len(set(links))

@@ -1,6 +1,5 @@
 """The study of speeds: its sweeps, its bound for a step, and the figures that pages quote."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -62,24 +61,10 @@ def read_tables() -> dict[tuple[str, str], list[float]]:
     return numbers
 
 
-def test_always_printed_tables_are_complete_and_quoted(study):
-    """The printed tables contain every scene, law and sweep of the study; the README quotes them."""
+def test_always_printed_tables_are_complete(study):
+    """The printed tables contain every scene, law and sweep of the study."""
     numbers = read_tables()
     names = {"first": study.FIRST_RUNS, "step": study.LAWS, "cases": study.SWEEPS}
     for kind, expected in names.items():
         heading = study.HEADINGS[kind][0]
         assert [name for first, name in numbers if first == heading] == list(expected)
-
-    text = " ".join((ROOT / "README.md").read_text("utf-8").split())
-    first, later, step, rate = re.search(
-        r"The first run compiles for (\S+) CPU s, later ones take (\S+); a step of the event-driven engine takes (\S+) us "
-        r"\(Coulomb\), and a sweep computes (\S+) such cases per CPU s",
-        text,
-    ).groups()
-    quoted = [float(first), float(later), float(step), float(rate)]
-    ours = [
-        *numbers[study.HEADINGS["first"][0], "shipped rig"][:2],
-        numbers[study.HEADINGS["step"][0], "coulomb"][0],
-        numbers[study.HEADINGS["cases"][0], "coulomb"][0],
-    ]
-    assert quoted == pytest.approx(ours, rel=0.06)  # two digits

@@ -20,7 +20,7 @@ from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws import make_law, masing
 from patchfem.hybrid.records import LawNumbers
 from patchfem.model import make_bond_parameters
-from patchfem.runs import estimate_hybrid_errors
+from patchfem.runs.rig.engines import estimate_hybrid_errors
 
 # Names of the rigs are the seeds by which they were drawn.
 RIGS = json.loads(Path(__file__).with_suffix(".json").read_text("utf-8"))

@@ -7,8 +7,8 @@ from ...friction.protocol import SteadyLoop
 from ...friction.record import steady_loop
 from ...hybrid import quasi_static
 from ...response.errors import add_errors
-from ...runs.bench.errors import estimate_bench_errors
 from ...runs.rig import decays
+from ...runs.rig.rig import estimate_slide_errors
 from .balance import compute_constant_curve
 from .bench_loops import LOOP_MEASURES, compute_steady_loop
 from .joint import JointMode
@@ -147,10 +147,8 @@ def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
     loops_with_area_error = []
     for slide in slides:
         steady = compute_steady_loop(joint.model, joint.patch, float(slide), frequency)
-        changes = estimate_bench_errors(steady.model, patches, steady.run, steady.steps)
-        measures = add_errors(
-            steady.run.values, changes.errors, min_relative_error=MIN_RELATIVE_LOOP_ERROR
-        )
+        errors = estimate_slide_errors(steady.model, patches, steady.run, steady.steps)
+        measures = add_errors(steady.run.values, errors, min_relative_error=MIN_RELATIVE_LOOP_ERROR)
         stiffness, area = (steady.run.values[name] for name in LOOP_MEASURES)
         errors = [measures[name].error for name in LOOP_MEASURES]
         stiffness_error, area_error = np.add(errors, steady.change)

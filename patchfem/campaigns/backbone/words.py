@@ -37,13 +37,13 @@ NO_CURVE_ADVICE = (
 
 
 def write_notes(joint: JointMode, amplitudes, backbone: Backbone) -> tuple[str, ...]:
-    """Write notes on a backbone: removed joint, gaps of the curves, what the errors leave out.
+    """Write notes on a backbone: gaps of the curves, what the errors leave out.
 
     `amplitudes` (k,) [m] are the requested ones.
     """
     model = joint.model
     curves = backbone.curves
-    notes = [*model.describe_removed_joint()]
+    notes = []
     has_friction = model.friction is not None or model.rig.friction.interfaces
     if joint.is_linear and has_friction:
         notes.append("no friction acts, so frequency and damping are the same at all amplitudes")

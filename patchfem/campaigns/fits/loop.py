@@ -17,10 +17,10 @@ from ...identify.intervals import IntervalKind
 from ...inputs.loops import Loop, read_loop
 from ...model.model import Model, build
 from ...model.source import locate_errors
-from ...runs.batch.meshes import SharedMeshes
 from ...runs.bench.bench import run_bench
 from ...runs.bench.engine import choose_smooth_bond_summation
-from ...runs.patch.mesh_levels import solve_on_other_mesh
+from ...runs.patch.condensed import CondensedPair
+from ...runs.patch.mesh_levels import condense_for_contacts, solve_on_other_mesh
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
 from ..free_keys import FreeKeys, solve_contact
@@ -94,7 +94,7 @@ class LoopComparison(Comparison):
         self.steps_per_row = max(1, -(-(steps or 1) // (loop.reading.size - 1)))
         self.step_error = 0.0
         self.patch = None
-        self.meshes = None
+        self.pairs: list[CondensedPair | None] = []
 
     def compute(self, values: Sequence[float], needed: np.ndarray | None = None) -> np.ndarray:
         """Compute the reading (k,) at all rows for values (n,) [SI] of the keys.
@@ -133,23 +133,26 @@ class LoopComparison(Comparison):
         if model.patch is None:
             return None
         if self.keys.changes_contact:
-            if self.meshes is None:
-                self.meshes = self._choose_meshes()
-            self.patch = solve_contact(self.meshes.with_shared_meshes(model))
+            if not self.pairs:
+                self.pairs.append(self._condense_common_mesh())
+            self.patch = solve_contact(model, self.pairs[0])
         elif self.patch is None:
             self.patch = solve_contact(model)
         return self.patch
 
-    def _choose_meshes(self) -> SharedMeshes:
-        """Return common meshes of all values: those of the lower ends, the middles and the upper ends of the ranges."""
-        models = []
+    def _condense_common_mesh(self) -> CondensedPair | None:
+        """Condense the pieces on a mesh for the lower ends, the middles and the upper ends of the ranges.
+
+        The result is None if these have different pieces, so that each value has its own mesh.
+        """
+        patches = []
         low, high = self.keys.bounds.T
         for part in (0.0, 0.5, 1.0):
             try:
-                models.append(self.keys.build_model(low + part * (high - low)))
+                patches.append(self.keys.build_model(low + part * (high - low)).patch)
             except PatchfemError:
                 continue  # the search counts this error as a failed evaluation, too
-        return SharedMeshes(models)
+        return condense_for_contacts(patches)
 
     def measure_step_change(self, values: Sequence[float]) -> np.ndarray:
         """Return the change (k,) of the reading that follows from fitted `values` when the time steps are halved."""

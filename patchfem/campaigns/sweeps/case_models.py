@@ -176,14 +176,14 @@ class SweepScene:
         return sha256(json.dumps(shared, sort_keys=True, default=str).encode()).hexdigest()
 
     def has_shared_meshes(self, keys: Sequence[str]) -> bool:
-        """Return whether the cases may have one mesh that is chosen for all of them; each case of a rig has its own.
+        """Return whether the cases may have meshes that are chosen for all of them; each case with a motion has its own.
 
         `keys` are the swept keys.
         """
         tables = tomllib.loads(self.text)
-        if "structure" in tables:
-            return False
         set_keys = {*keys, *(split_assignment(text)[0] for text in self.sets)}
+        if {"structure", "slide"} & {*tables, *(key.partition(".")[0] for key in set_keys)}:
+            return False
         set_keys |= {f"contact.{key}" for key in tables.get("contact", ())}
         has_contact = any(key.startswith("contact.") for key in set_keys)
         return has_contact and not {"contact.element_size", "contact.mesh"} & set_keys

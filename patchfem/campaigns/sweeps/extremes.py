@@ -1,7 +1,8 @@
 """Smallest or largest value of a measure inside the range of a swept key, and where it lies.
 
 It is the vertex of the parabola through the extreme case and its neighbours, over the logarithm of a key whose values are
-spaced by factors.
+spaced by factors. A vertex that differs from the extreme case by more than EXTREME_BAND is not resolved by the cases: the
+extreme is then that case, and lies somewhere between its neighbours.
 """
 
 from itertools import product
@@ -30,9 +31,9 @@ class Extreme(NamedTuple):
         Value of the key.
     interval : tuple of float
         Smallest and largest value of the key between which the extreme lies.
-    band : tuple of float
+    band : tuple of float, optional
         Values of the key between which the measure differs from its extreme by at most EXTREME_BAND; an end of the sweep
-        where it does not leave this band.
+        where it does not leave this band. None if the cases do not resolve the extreme.
     """
 
     measure: str
@@ -42,7 +43,7 @@ class Extreme(NamedTuple):
     value: float
     place: float
     interval: tuple[float, float]
-    band: tuple[float, float]
+    band: tuple[float, float] | None
 
 
 def find_extreme(table: SweepTable, name: str) -> Extreme | None:
@@ -86,7 +87,12 @@ def find_extreme(table: SweepTable, name: str) -> Extreme | None:
 
     place, value = _find_vertex(x[top - 1 : top + 2], y[top - 1 : top + 2])
     ends = _find_interval(x, y, error, top)
-    band = _find_band(x, y, top, value)
+    band = _find_band(x, y, place, value)
+    if abs(value - y[top]) > EXTREME_BAND * abs(y[top]):
+        place = x[top]
+        value = float(y[top])
+        ends = (x[top - 1], x[top + 1])
+        band = None
     to_key = np.exp if key.is_logarithmic else float
     return Extreme(
         measure=name,
@@ -96,7 +102,7 @@ def find_extreme(table: SweepTable, name: str) -> Extreme | None:
         value=value,
         place=float(to_key(place)),
         interval=(float(to_key(ends[0])), float(to_key(ends[1]))),
-        band=(float(to_key(band[0])), float(to_key(band[1]))),
+        band=None if band is None else (float(to_key(band[0])), float(to_key(band[1]))),
     )
 
 
@@ -145,21 +151,23 @@ def _find_interval(
     return float(low), float(high)
 
 
-def _find_band(x: np.ndarray, y: np.ndarray, top: int, value: float) -> tuple[float, float]:
-    """Return the ends of the places around an extreme case, `top`, where y differs from `value` by at most EXTREME_BAND.
+def _find_band(x: np.ndarray, y: np.ndarray, place: float, value: float) -> tuple[float, float]:
+    """Return the ends of the places around an extreme at `place` where y differs from `value` by at most EXTREME_BAND.
 
-    `x` (m,) are increasing places with values `y` (m,), between which y is interpolated linearly.
+    `x` (m,) are increasing places with values `y` (m,), between which and the extreme y is interpolated linearly.
     """
     change = np.abs(y - value) - EXTREME_BAND * abs(value)
     ends = []
-    for step in (-1, 1):
-        k = top
-        while 0 <= k + step < x.size and change[k + step] <= 0:
-            k += step
-        end = x[k]
-        if 0 <= k + step < x.size:
-            # An extreme case may itself lie outside the band of the vertex.
-            inside = min(change[k], 0.0)
-            end += (x[k + step] - x[k]) * inside / (inside - change[k + step])
+    for is_beyond, order in ((x < place, -1), (x > place, 1)):
+        # The extreme itself is inside by the whole band. The first case outside, seen from there, ends the band.
+        inside = (place, -EXTREME_BAND * abs(value))
+        end = place
+        for k in np.flatnonzero(is_beyond)[::order]:
+            end = x[k]
+            if change[k] > 0:
+                last, depth = inside
+                end = last + (x[k] - last) * depth / (depth - change[k])
+                break
+            inside = (x[k], change[k])
         ends.append(float(end))
     return ends[0], ends[1]

@@ -8,7 +8,6 @@ In: `WorkerData`, case numbers and an executor of `executors/`. Out: results by 
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from time import perf_counter
 
 import numpy as np
@@ -19,7 +18,6 @@ from ...model.model import Model
 from ...model.similar_models import SimilarModels
 from ...runs.batch import batches
 from ...runs.batch.case_results import CaseResults
-from ...runs.batch.meshes import NO_SHARED_MESHES, SharedMeshes
 from .case_models import SweepScene
 from .cases import Cases
 
@@ -29,7 +27,6 @@ TARGET_CHUNK_SECONDS = 1.0
 MAX_CASES_PER_CHUNK = 4096  # Largest number of cases in a chunk.
 MIN_SIMILAR_CASES = 2  # Smallest number of cases whose models are derived from one of them.
 MAX_CASES_TRIED = 3  # Cases that are tried until one is valid, which shows the plain keys.
-MAX_MESH_CASES = 256  # Largest number of cases that determine the shared meshes of a sweep.
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +46,6 @@ class WorkerData:
         index of the CaseResults.
     keep : callable, optional
         keep(number, Result) is called after each run.
-    meshes : SharedMeshes
-        Meshes common to all cases, from `prepare_work`.
     plain_keys : tuple of str
         Swept keys whose numbers no check depends on, from `find_plain_keys`; cases that differ only in them have similar
         models.
@@ -62,7 +57,6 @@ class WorkerData:
     cases: Cases
     extract: Callable | None = None
     keep: Callable | None = None
-    meshes: SharedMeshes = NO_SHARED_MESHES
     plain_keys: tuple[str, ...] = ()
     group: Hashable | None = None
 
@@ -144,13 +138,12 @@ def _group_models(
             continue
 
         # cases whose numbers are not plain go to the last group
-        model = work.meshes.with_shared_meshes(base.model)
         values = np.array([columns[key][places] for key in keys]).T
         is_plain = base.plain_numbers.are_plain(values)
         places = places[is_plain]
         is_single[places] = False
         group = values[is_plain], cases.assignments, numbers[places]
-        yield places, SimilarModels(base.plain_numbers, model, *group)
+        yield places, SimilarModels(base.plain_numbers, base.model, *group)
 
     places = np.flatnonzero(is_single)
     if places.size:
@@ -158,39 +151,32 @@ def _group_models(
 
 
 def _build_case_model(work: WorkerData, number: int):
-    """Return the model of a case, by its number, with the shared meshes, or the error of its scene.
+    """Return the model of a case, by its number, or the error of its scene.
 
     `work` is the data of the sweep.
     """
     try:
-        model = work.sweep_scene.build_model(work.cases.assignments(number))
+        return work.sweep_scene.build_model(work.cases.assignments(number))
     except PatchfemError as error:
         return error
-    return work.meshes.with_shared_meshes(model)
 
 
 def prepare_work(work: WorkerData) -> WorkerData:
-    """Return the data of a sweep, `work`, with what all its cases determine together: plain keys, engine and meshes.
+    """Return the data of a sweep, `work`, with what all its cases determine together: plain keys and engine.
 
-    All cases of the sweep count, also those that are already computed. No meshes are chosen for rigs, for patches that wear,
-    and for patches that are solved in blocks, each of which has its own meshes.
+    All cases of the sweep count, also those that are already computed.
     """
+    if work.keep is not None:
+        return work
     cases = work.cases
     keys = [axis.key for axis in cases.axes]
     for number in cases.spread_case_numbers(MAX_CASES_TRIED):
         first = _build_case_model(work, number)
         if isinstance(first, Model):
-            break
-    else:  # the run of each case reports its error
-        return work
-    if work.keep is None:
-        plain_keys = work.sweep_scene.find_plain_keys(keys, cases.assignments(number))
-        work = replace(work, plain_keys=plain_keys, group=batches.find_group(first, len(cases)))
-    if first.patch is None or not first.patch.mesh.is_fine or work.has_blocks:
-        return work
-    numbers = cases.spread_case_numbers(MAX_MESH_CASES)
-    models = chain.from_iterable(group for _, group in _group_models(work, np.array(numbers)))
-    return replace(work, meshes=SharedMeshes(models))
+            plain_keys = work.sweep_scene.find_plain_keys(keys, cases.assignments(number))
+            group = batches.find_group(first, len(cases))
+            return replace(work, plain_keys=plain_keys, group=group)
+    return work  # the run of each case reports its error
 
 
 def _list_blocks(work: WorkerData, numbers: Sequence[int]) -> list[list[int]]:

@@ -1,1 +1,1 @@
-"""Charts of answers: rows of a table (`table`), their data (`panels`), drawn for a page (`plotly`) or a picture (`axes`)."""
+"""Charts of answers: data of their rows (`panels`), drawn for a page (`plotly`) or a picture (`axes`)."""

@@ -9,9 +9,9 @@ import numpy as np
 from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
 from ..answer import Answer
+from ..rows import CHARTS
 from .panels import Curve, Panel, make_panels
 from .plotly import CURVE_COLOURS, ERROR_BAND_OPACITY, STATE_COLOURS
-from .table import CHARTS
 
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 # Number of charts of a picture, 1 for all other kinds of answers. A backbone needs frequency, damping and force.

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...formatting import format_number, needs_log_scale
 from ..answer import Answers, Variable, Variables
+from ..rows import Chart
 from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
-from .table import Chart
 
 MAX_MAP_COLUMNS = 400  # largest number of columns; a finer map keeps every n-th one
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
@@ -190,7 +190,7 @@ def _select_span(data: Variables, chart: Chart) -> Variables:
 def _find_span(data: Variables, span: str, x_name: str) -> np.ndarray | None:
     """Return the indices of the span of a chart along `time` or `x`, or None for the whole of it.
 
-    `data` are the variables of an answer, `span` is as in `table.Chart`, and `x_name` names the horizontal variable.
+    `data` are the variables of an answer, `span` is as in `rows.Chart`, and `x_name` names the horizontal variable.
     """
     period = float(data["period"].values) if "period" in data else np.inf
     if span == "cycles" and np.isfinite(period):

@@ -14,8 +14,8 @@ from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES
 from ..answer import Answer, Answers, Variables
 from ..quantities import format_value
+from ..rows import Chart
 from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
-from .table import Chart
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
 MAX_CHART_LINES = 8  # lines of a chart, one for each combination of the other keys

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import explain_mkdir_error, write_rows, write_text
-from .blocks import VTK_FIELDS
-from .vtkhdf import Frames, collect_frames, write_blocks
+from .vtkhdf import VTK_FIELDS, Frames, collect_frames, write_blocks
 
 if TYPE_CHECKING:
     from pyvista import MultiBlock
@@ -113,20 +112,29 @@ def _write_vtu(grid, out: Path) -> None:
 
 
 def _write_pvd(frames: Frames, out: Path) -> None:
-    """Write each part in each frame as .vtu in a folder beside a .pvd, which lists them with their times."""
+    """Write each part in each frame as .vtu in a folder beside a .pvd, which lists the frames with their times.
+
+    A .vtm of each frame has the names of the parts, which a .pvd cannot have.
+    """
     folder = out.with_name(f"{out.stem}_frames")
     create_folder(folder)
     lines = []
     for number, time in enumerate(frames.times.tolist()):
-        grids = make_grids(frames, number)
-        for code, part in enumerate(frames.blocks):
+        parts = []
+        for part, grid in zip(frames.blocks, make_grids(frames, number), strict=True):
             name = f"{part}_{number:04d}.vtu"
-            _write_vtu(grids[part], folder / name)
-            lines.append(
-                f'<DataSet timestep="{time!r}" part="{code}" file="{folder.name}/{name}"/>'
-            )
-    text = "\n".join(lines)
-    write_text(out, f'<VTKFile type="Collection"><Collection>\n{text}\n</Collection></VTKFile>\n')
+            _write_vtu(grid, folder / name)
+            parts.append(f'<DataSet index="{len(parts)}" name="{part}" file="{name}"/>')
+        name = f"frame_{number:04d}.vtm"
+        write_text(folder / name, _format_collection("vtkMultiBlockDataSet", parts))
+        lines.append(f'<DataSet timestep="{time!r}" file="{folder.name}/{name}"/>')
+    write_text(out, _format_collection("Collection", lines))
+
+
+def _format_collection(kind: str, entries: list[str]) -> str:
+    """Return a file of VTK that lists other files, given its kind and its entries."""
+    text = "\n".join(entries)
+    return f'<VTKFile type="{kind}" version="1.0"><{kind}>\n{text}\n</{kind}></VTKFile>\n'
 
 
 def _write_csv(frames: Frames, out: Path, number: int) -> None:

@@ -1,6 +1,6 @@
 """Laboratory files: histories and loops of results out, records in, and the structure of a scene for other programs.
 
-Universal files (dataset 58, with units in 164), .mat, and CSV with units. `write` and `universal` write, `imported` reads
+Universal files (dataset 58, with units in 164), .mat, and CSV with units. `write` writes, `imported` reads
 laboratory files as tables and modes, `structures` writes matrices and friction elements.
 
 Read `write` first.

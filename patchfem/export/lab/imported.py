@@ -18,7 +18,7 @@ from ...scene.keys import quantities
 from ...scene.keys.removed import describe_removed
 from ..answer import JsonObject
 from ..columns import format_csv
-from . import universal
+from . import write
 
 # columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
 DISPLACEMENT_COLUMN_NAMES = {
@@ -226,7 +226,7 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
     mass = 'moving_mass = "1 kg"  # assumed: not in the record'
     if modes.mass is not None:
         mass = f'moving_mass = "{modes.mass!r} kg"'
-    remarks = [f"modes of {source}, by {universal.PROGRAM_AND_VERSION}", *modes.notes]
+    remarks = [f"modes of {source}, by {write.PROGRAM_AND_VERSION}", *modes.notes]
     lines = [*(f"# {printable(remark)}" for remark in remarks), "", "[structure]", mass]
     for k, about in enumerate(modes.descriptions):
         comment = f"  # {printable(about)}" if about else ""

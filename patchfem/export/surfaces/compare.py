@@ -8,33 +8,23 @@ import numpy as np
 
 from ... import __version__
 from ...campaigns import compare as pressing
+from ...campaigns import surface_pairs
 from ...campaigns.compare import SurfaceRuns
+from ...campaigns.surface_pairs import TableLine
 from ...core import PatchfemError
 from ...surface.areal import level
 from ...surface.compare import compare
 from ...surface.compare.compare import COMPARE_DEFAULTS, Options
 from ...surface.compare.records import Comparison, Track
 from ...surface.profile import resample_evenly
-from ...surface.quantity import CONFIDENCE_LEVEL, HALF_WIDTH_95, Quantity
+from ...surface.quantity import HALF_WIDTH_95
 from ...surface.spectrum import WAVE_BAND
-from ..answer import Answer, JsonObject, Remarks, Variable, Variables
-from ..surface_definitions import name_in_track
-from . import predicted as predicted_wear
-from . import sentences
-from .sentences import to_answers
-from .variables import make_band, make_maps, make_variables
+from ..answer import Answer, JsonObject, Remarks, Variables
+from ..rows import make_variables
+from . import shared, worn
+from .shared import SURFACE_NAMES, build_answer, make_band, make_maps, to_answers
 
-SURFACE_NAMES = ("before", "after")  # keys of the two compared surfaces or runs
-# Meanings of the codes of the variable `state`
-WEAR_STATES = ("not used", "unworn", "worn", "grown")
-# Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
-SHOWN_ELSEWHERE = (
-    "worn_depth_within",
-    "worn_from_before",
-    "worn_from_after",
-    "worn_to_before",
-    "worn_to_after",
-)
+CHARTED_QUANTITIES = ("worn_depth_mean", "amplitude_ratio")  # quantities of the charts of pairs
 MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
 
 
@@ -75,7 +65,7 @@ def answer_files(
     answer = make_answer(comparison)
     if predicted is None:
         return answer
-    return predicted_wear.add_predicted(answer, comparison, predicted, piece)
+    return worn.add_predicted(answer, comparison, predicted, piece)
 
 
 def compare_with_scene(
@@ -114,7 +104,7 @@ def compare_with_scene(
 
 def make_answer(comparison: Comparison) -> Answer:
     """Return the answer of a comparison of two surfaces: its sentences, quantities, curves and content of compare.json."""
-    words = sentences.describe_comparison(comparison)
+    words = shared.describe_comparison(comparison)
     surfaces = (comparison.before, comparison.after)
     file_notes = [note for surface in surfaces for note in surface.notes]
     track = comparison.track
@@ -137,61 +127,10 @@ def make_answer(comparison: Comparison) -> Answer:
         },
     )
     # A mean depth is meaningless without the region of the mean.
-    if sentences.is_known(comparison.values.get("worn_depth_mean")):
-        region = sentences.describe_region(comparison).removeprefix("the ")
+    if shared.is_known(comparison.values.get("worn_depth_mean")):
+        region = shared.describe_region(comparison).removeprefix("the ")
         answer.details["worn_depth_mean"]["over"] = region
     return answer
-
-
-def build_answer(
-    *,
-    sources: list[str],
-    words: sentences.Words,
-    values: dict[str, Quantity],
-    track: dict[str, Quantity],
-    data: Variables,
-    details: JsonObject,
-) -> Answer:
-    """Return the answer of a comparison of two surfaces or runs.
-
-    Parameters
-    ----------
-    sources : list of str
-        Files or folders before and after wear.
-    words : Words
-        Verdict, warnings and notes.
-    values, track : dict of str to Quantity
-        Quantities of the whole surface, and of the longest track ({} without one).
-    data : dict of str to Variable
-        Variables of the charts by name.
-    details : dict
-        Further content of compare.json.
-    """
-    # Values are shown once on the page; compare.json has them all.
-    values = values | {name_in_track(name): value for name, value in track.items()}
-    shown = {name: one for name, one in values.items() if name not in SHOWN_ELSEWHERE}
-
-    # Head of compare.json: the verdict and all quantities. `details` follow.
-    content = {
-        "patchfem": __version__,
-        "verdict": words.verdict[0],
-        "sentences": [*words.verdict[1:], *words.warnings, *words.notes],
-        "confidence": CONFIDENCE_LEVEL,
-        **dict(zip(SURFACE_NAMES, sources, strict=True)),
-        **to_answers(values),
-        "track": to_answers(track) or None,
-    }
-
-    return Answer(
-        kind="compare",
-        title=" and ".join(Path(source).name for source in sources),
-        verdict=words.verdict,
-        quantities=to_answers(shown),
-        data=data,
-        remarks=Remarks(words.warnings, words.notes),
-        details=content | details,
-        origin={"patchfem": __version__},
-    )
 
 
 def _describe_place(comparison: Comparison) -> JsonObject:
@@ -217,7 +156,7 @@ def _compare_roughness(comparison: Comparison) -> JsonObject:
             row = {side: entries[name] for side, entries in content[region].items()}
             rows[f"{name} {region}"] = row | {"cutoff": {"value": evidence.cutoff, "unit": "m"}}
     if not rows:
-        content["reason"] = sentences.MISSING_VALUE_REASONS[_explain_no_roughness(comparison)]
+        content["reason"] = shared.MISSING_VALUE_REASONS[_explain_no_roughness(comparison)]
     return {"roughness": content, "track_roughness": rows}
 
 
@@ -241,10 +180,10 @@ def _make_data(comparison: Comparison) -> Variables:
             curves.x, curves.y, before_map=heights[0], after_map=heights[1], depth_map=curves.depth
         )
     else:
-        data = make_variables("x", x=curves.x, before=heights[0], after=heights[1])
-        data |= make_band("x", "depth", curves.depth, HALF_WIDTH_95 * curves.noise)
-        state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3)).astype(np.int8)
-        data["state"] = Variable(("x",), state, "", "state of each height", WEAR_STATES)
+        data = make_variables("surface", x=curves.x, before=heights[0], after=heights[1])
+        data |= make_band("depth", curves.depth, HALF_WIDTH_95 * curves.noise)
+        state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3))
+        data |= make_variables("surface", state=state)
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)
 
 
@@ -253,7 +192,7 @@ def _make_tracks(tracks: tuple[Track, ...]) -> Variables:
     if not tracks:
         return {}
     ends = [track.values[name].value for track in tracks for name in ("from", "to")]
-    return make_variables("track_end", track_end=np.array(ends, float))
+    return make_variables("surface", track_end=ends)
 
 
 def _make_separate(comparison: Comparison) -> Variables:
@@ -263,7 +202,7 @@ def _make_separate(comparison: Comparison) -> Variables:
     data = {}
     traces = [level(resample_evenly(each)) for each in (comparison.before, comparison.after)]
     for side, trace in zip(SURFACE_NAMES, traces, strict=True):
-        data |= make_variables(f"x_{side}", **{f"x_{side}": trace.x, f"trace_{side}": trace.z})
+        data |= make_variables("surface", **{f"x_{side}": trace.x, f"trace_{side}": trace.z})
     return data | _make_abbott([trace.z for trace in traces])
 
 
@@ -274,8 +213,8 @@ def _make_abbott(heights) -> Variables:
         return {}
     curves = [np.quantile(values, 1 - MATERIAL_RATIOS) for values in known]
     return make_variables(
-        "material_ratio",
-        material_ratio=(MATERIAL_RATIOS, "1"),
+        "surface",
+        material_ratio=MATERIAL_RATIOS,
         abbott_before=curves[0],
         abbott_after=curves[1],
     )
@@ -286,8 +225,8 @@ def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
     pressed = runs.as_dict()
     data = dict(answer.data)
     for side, (places, stress) in runs.pressures().items():
-        x = f"x_pressed_{side}"
-        data |= make_variables(x, **{x: places, f"pressure_{side}": (stress, "Pa")})
+        columns = {f"x_pressed_{side}": places, f"pressure_{side}": stress}
+        data |= make_variables("surface", **columns)
     warnings = (*answer.remarks.warnings, *runs.failed, *pressed["warnings"])
     return replace(
         answer,
@@ -295,3 +234,90 @@ def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
         remarks=Remarks(warnings, answer.remarks.notes),
         details=answer.details | {"pressed": pressed},
     )
+
+
+def answer_pairs(
+    table: Path, options: Options = COMPARE_DEFAULTS, report_progress: Callable | None = None
+) -> Answer:
+    """Compare the two files or results folders of each line of a table.
+
+    Parameters
+    ----------
+    table : Path
+        As `campaigns.surface_pairs.read_pairs` reads it.
+    options : Options
+        Of all pairs of files; `direction` is that of the lines that state none.
+    report_progress : callable, optional
+        Receives the fraction of the pairs that are done.
+
+    Returns
+    -------
+    Answer
+        Kind "pairs". A pair that fails has the `outcome` "failed" and a `message`; the others continue.
+
+    Raises
+    ------
+    Missing
+        If the table is not there.
+    PatchfemError
+        If it is no such table.
+    """
+    lines = surface_pairs.read_pairs(table)
+    rows = []
+    for line in lines:
+        rows.append(_compare_line(line, options))
+        if report_progress is not None:
+            report_progress(len(rows) / len(lines))
+    return make_pairs_answer(rows, Path(table).name)
+
+
+def _compare_line(line: TableLine, options: Options) -> JsonObject:
+    """Return the content of compare.json for the pair of a line, with the cells of the line."""
+    cells = {"line": line.line, "before": line.names[0], "after": line.names[1]}
+    cells["labels"] = dict(line.labels)
+    direction = line.direction or options.direction
+    try:
+        if any(path.is_dir() for path in line.paths):
+            for option, value in (("a direction", line.direction), ("a shift", options.shift)):
+                if value not in ("", None):
+                    raise PatchfemError(
+                        f"{option} can be given only for traces, not for results folders"
+                    )
+            answer = worn.answer_runs(*line.paths)
+        else:
+            answer = answer_files(*line.paths, options._replace(direction=direction))
+    except Exception as error:  # a defect of one pair must not lose the answers of the others
+        reason = str(error)
+        if not isinstance(error, PatchfemError):
+            reason = f"internal fault, please report it: {type(error).__name__}: {error}"
+        return cells | {"direction": direction or None, "outcome": "failed", "message": reason}
+    return answer.details | cells | {"outcome": "done", "message": ""}
+
+
+def make_pairs_answer(rows: list[JsonObject], name: str) -> Answer:
+    """Return the answer of the compared pairs of a table with this name."""
+    return Answer(
+        kind="pairs",
+        title=name,
+        verdict=(_count_pairs(rows),),
+        data=_make_pairs_data(rows),
+        details={"patchfem": __version__, "pairs": rows},
+        origin={"patchfem": __version__},
+    )
+
+
+def _count_pairs(rows: list[JsonObject]) -> str:
+    """Return the headline: numbers of pairs, of pairs with wear and of failed pairs."""
+    failed = sum(row["outcome"] == "failed" for row in rows)
+    depths = [row.get("worn_depth_mean", {}) for row in rows]
+    n_worn = sum((depth.get("low") or 0.0) > 0 for depth in depths)
+    return f"{len(rows)} pairs: {n_worn} worn, {len(rows) - n_worn - failed} not, {failed} failed."
+
+
+def _make_pairs_data(rows: list[JsonObject]) -> Variables:
+    """Return the quantities of the charts with their intervals over the line of each pair."""
+    columns = {"line": [float(row["line"]) for row in rows]}
+    for name in CHARTED_QUANTITIES:
+        for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
+            columns[name + suffix] = [row.get(name, {}).get(key) for row in rows]
+    return make_variables("surface", **columns)

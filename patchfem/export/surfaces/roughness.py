@@ -14,10 +14,11 @@ from ...surface.roughness import peaks, report
 from ...surface.roughness.parameters import abbott_curve
 from ...surface.roughness.report import RoughnessReport
 from ...surface.spectrum import WAVE_BAND
-from ..answer import Answer, JsonObject, Remarks, Variable, Variables
+from ..answer import Answer, JsonObject, Remarks, Variables
 from ..quantities import format_value
-from . import sentences
-from .variables import make_maps, make_variables
+from ..rows import make_variables
+from . import shared
+from .shared import make_maps
 
 ROUGHNESS_INPUT_WORDS = {"profile": "traces", "areal": "scans"}
 # Probability of the interval of a parameter of a single trace, from 5 to 95 %
@@ -94,7 +95,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
             values = {key: mean.mean for key, mean in averages.items()}
             state = f"Mean of {len(members)} {name}: "
         headlines.append(f"{state}{_format_main_parameters(values, members)}.")
-        quantities |= sentences.to_answers(values)
+        quantities |= shared.to_answers(values)
 
     # A treatment that several surfaces share is named once, after the headlines.
     notes = [text for report in reports for text in report.notes]
@@ -105,7 +106,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
     return Answer(
         kind="profile",
         title="Roughness of " + ", ".join(Path(report.source).name for report in reports),
-        verdict=(*headlines, *treatments)[: sentences.MAX_VERDICT_SENTENCES],
+        verdict=(*headlines, *treatments)[: shared.MAX_VERDICT_SENTENCES],
         quantities=quantities,
         data=_make_data(reports),
         remarks=Remarks(tuple(cautions), (*notes, *([MEANS_NOTE] if means else []))),
@@ -164,7 +165,7 @@ def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[st
     """
     measures = {}
     for name, mean in means.items():
-        measures[name] = sentences.to_answer(mean.mean).as_json() | {"scatter": mean.scatter}
+        measures[name] = shared.to_answer(mean.mean).as_json() | {"scatter": mean.scatter}
     content = {"kind": kind, "files": count, "confidence": CONFIDENCE_LEVEL, "notes": notes}
     return content | {"measures": measures}
 
@@ -174,9 +175,9 @@ def _format_main_parameters(values: dict[str, Quantity], members: list[Roughness
     parts = []
     names = next(names for names in HEADLINE_PARAMETERS if names[0] in values)
     for name in names:
-        if not sentences.is_known(values.get(name)):
+        if not shared.is_known(values.get(name)):
             continue
-        text = f"{name} {sentences.format_value(name, values[name])}"
+        text = f"{name} {shared.format_value(name, values[name])}"
         if values[name].reason == "few_files":
             mean_values = [each[name].value for each in members]
             ends = [format_value(end, "m", 3) for end in (min(mean_values), max(mean_values))]
@@ -223,7 +224,7 @@ def report_to_dict(roughness: RoughnessReport) -> JsonObject:
         "form": treatment.form,
         "s_filter": treatment.short,
         "confidence": TRACE_INTERVAL_PROBABILITY if has_interval else None,
-        "measures": sentences.to_answers({value.name: value for value in roughness.values}),
+        "measures": shared.to_answers({value.name: value for value in roughness.values}),
         "notes": roughness.notes,
     }
     if roughness.kind == "areal":
@@ -245,11 +246,13 @@ def _find_moments(roughness: RoughnessReport) -> dict | None:
 
 def _make_data(reports: list[RoughnessReport]) -> Variables:
     """Return the Abbott curves of all files, and the profiles, map and spectrum of a single file."""
-    data = make_variables("file", file=(np.array([report.source for report in reports]), ""))
     curves = [abbott_curve(report.heights) for report in reports]
-    data |= make_variables("material_ratio", material_ratio=(curves[0][0], "1"))
-    heights = np.array([height for _, height in curves])
-    data["abbott"] = Variable(("file", "material_ratio"), heights, "m", "height")
+    data = make_variables(
+        "surface",
+        file=[report.source for report in reports],
+        material_ratio=curves[0][0],
+        abbott=[height for _, height in curves],
+    )
     # Only Abbott curves can be compared over files.
     if len(reports) > 1:
         return data
@@ -257,12 +260,11 @@ def _make_data(reports: list[RoughnessReport]) -> Variables:
     surface = reports[0].surface
     if reports[0].kind == "areal":
         return data | make_maps(surface.x, surface.y, height_map=surface.z)
-    data |= make_variables("x", x=surface.primary.x, primary=surface.primary.z)
+    data |= make_variables("surface", x=surface.primary.x, primary=surface.primary.z)
     if surface.roughness is not None:
         rough = surface.roughness
         data |= make_variables(
-            "x_rough", x_rough=rough.x, roughness=rough.z, waviness=surface.waviness.z
+            "surface", x_rough=rough.x, roughness=rough.z, waviness=surface.waviness.z
         )
     spectrum = surface.spectrum
-    density = (spectrum.density, "m3")
-    return data | make_variables("wavelength", wavelength=spectrum.waves, density=density)
+    return data | make_variables("surface", wavelength=spectrum.waves, density=spectrum.density)

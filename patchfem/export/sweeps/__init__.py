@@ -3,5 +3,5 @@
 In: the cases of a sweep and an executor. Out: files that are complete at every moment, and the
 `Answer` of the sweep.
 
-Read `store`, `folder`, `run`, then `words` and `answer`. `charts.sweeps` draws it.
+Read `folder`, `run`, then `words` and `answer`. `charts.sweeps` draws it.
 """

@@ -85,13 +85,17 @@ def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRa
     words = f"from {low} at {places[0]} to {high} at {places[1]}"
     for extreme in analysis.extremes:
         if extreme.measure == name:
-            numbers = (extreme.place, *extreme.interval, *extreme.band)
-            place, first, last, begin, end = (format_value(one, extreme.unit) for one in numbers)
+            side = "largest" if extreme.is_largest else "smallest"
+            first, last = (format_value(one, extreme.unit) for one in extreme.interval)
+            if extreme.band is None:
+                words += (
+                    f" (the {side} lies between {first} and {last}, where more cases are needed)"
+                )
+                continue
+            numbers = (extreme.place, *extreme.band)
+            place, begin, end = (format_value(one, extreme.unit) for one in numbers)
             value = _format_measure(name, column.unit, extreme.value)
-            words += (
-                f" ({'largest' if extreme.is_largest else 'smallest'}, {value}, at {place}, {first} to {last}; "
-                f"within 5 % of it from {begin} to {end})"
-            )
+            words += f" ({side}, {value}, at {place}, {first} to {last}; within 5 % of it from {begin} to {end})"
     return words
 
 

@@ -59,5 +59,7 @@ def masing_loop(stiffness, yield_displacement, amplitude) -> SteadyLoop:
 
 
 def from_keys(friction, load: float) -> ElasticPlastic:
-    """Return the elastic-plastic law that a [friction] table defines; load [N] is not used."""
-    return ElasticPlastic(friction.static, friction.bond_length)
+    """Return the elastic-plastic law that a [friction] table defines; a stiffness in it is that under the load [N]."""
+    if friction.stiffness is None:
+        return ElasticPlastic(friction.static, friction.bond_length)
+    return ElasticPlastic(friction.static, friction.static * load / friction.stiffness)

@@ -246,7 +246,7 @@ def _list_numbers(model: Model) -> tuple[float, ...]:
     # Bonds of a batch do not grow.
     has_bonds = law_has_trait(friction.law, "bonds")
     law = Bonds(friction.static, friction.bond_length) if has_bonds else make_law(friction, load)
-    has_stiffness = friction.law not in ("coulomb", "tanh")
+    has_stiffness = not law_has_trait(friction.law, "memoryless")
     cycles = int(rig.drive.cycles)
     return (
         *list_parameters(rig.modes, rig.drive.signal, load, cycles, min(10, cycles // 10), rig.start),

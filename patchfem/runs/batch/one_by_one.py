@@ -6,6 +6,7 @@ In: models. Out: `CaseResults`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from time import process_time
 
 import numpy as np
@@ -47,7 +48,7 @@ def solve(
         try:
             if isinstance(model, PatchfemError):
                 raise model
-            result = run(plan(model), report)
+            result = run(replace(plan(model), draws_curve=on_result is not None), report)
             if on_result is not None:
                 on_result(case, result)
         except FAILED_CASE_ERRORS as error:

@@ -15,7 +15,7 @@ from ...model.model import Model
 from ...model.similar_models import SimilarModels
 from .. import findings
 from ..patch import case_meshes, measures, result, strength
-from ..patch.cases import Batch, OutcomeCode
+from ..patch.cases import Batch, MeshFact, OutcomeCode
 from ..results.patch_rows import PATCH_TABLE
 from ..results.result import Advice, shorten_file_names
 from .case_results import FAILED_OUTCOME, CaseResults, has_unreadable_measurements
@@ -33,8 +33,7 @@ OUTCOMES = {
 def can_solve(model: Model) -> bool:
     """Return whether similar models of `model` are solved together.
 
-    Single runs treat faces, measured profiles and mesh files, and state what they neglect between unlike pieces, at
-    rounded ends and for the asperities of a trace.
+    Single runs treat faces and measured profiles, and state what they neglect for the asperities of a trace.
     """
     if model.kind != "patch" or has_unreadable_measurements(model):
         return False
@@ -42,9 +41,6 @@ def can_solve(model: Model) -> bool:
     return (
         patch.area is None
         and patch.gap.profile is None
-        and patch.mesh.file is None
-        and patch.pieces.are_alike
-        and patch.pieces.lower.end.kind != "radius"
         and getattr(patch.interface.skin, "rms_height", None) is None
     )
 
@@ -78,8 +74,9 @@ def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
     `model` is one of the models, with the texts that all of them have in common.
     """
     patch = model.patch
-    for count in np.unique(batch.n_nodes):
-        results.numerics[batch.n_nodes == count] = {"interface_nodes": int(count)}
+    counts = batch.facts[MeshFact.N_NODES]
+    for count in np.unique(counts):
+        results.numerics[counts == count] = {"interface_nodes": int(count)}
     reason = "; or ".join(measures.list_unbounded_pressure_reasons(patch))
     for name in measures.PRESSURE_PEAK_MEASURES:
         is_unbounded = np.isnan(batch.values[name]) & (batch.outcome != OutcomeCode.FAILED)
@@ -102,18 +99,25 @@ def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
     peaks = np.nan_to_num(batch.values[peak])
     certain = peaks - np.nan_to_num(batch.errors[peak])
     approaches = np.nan_to_num(batch.values["approach"])
+    coupling = batch.facts[MeshFact.COUPLING]
     is_own = batch.outcome == OutcomeCode.NO_CONTACT
-    if result.warn_of_strains(patch, peaks.max(), approaches.max()) or (
-        strength.note_on_yielding_faces(patch, certain.max())
+    is_own |= batch.facts[MeshFact.STEEP_END] > 0
+    if (
+        result.warn_of_strains(patch, peaks.max(), approaches.max())
+        or strength.note_on_yielding_faces(patch, certain.max())
+        or result.note_on_coupling(coupling.max())
     ):
         is_own[:] = batch.outcome != OutcomeCode.FAILED
     for case in np.flatnonzero(is_own).tolist():
         own = result.warn_of_strains(patch, peaks[case], approaches[case])
+        if batch.facts[MeshFact.STEEP_END, case]:
+            own.append(result.STEEP_END_WARNING)
         if batch.outcome[case] == OutcomeCode.NO_CONTACT:
             own.append(Outcome.NO_CONTACT.sentence)
         results.warnings[case] = [*warnings, *own]
         yielding = strength.note_on_yielding_faces(patch, certain[case])
-        results.notes[case] = [*notes, *yielding.values()]
+        coupled = result.note_on_coupling(coupling[case])
+        results.notes[case] = [*coupled, *notes, *yielding.values()]
 
 
 def _insert_findings(model: Model, batch: Batch, results: CaseResults) -> None:
@@ -139,7 +143,7 @@ def _insert_findings(model: Model, batch: Batch, results: CaseResults) -> None:
         elif batch.excess[case] <= 1:
             finer = findings.PROPOSED_TOLERANCE_RATIO * tolerance
             advice = f"set accuracy.tolerance = {finer:.3g} for a finer mesh"
-        cause = f"the mesh ({batch.n_nodes[case]} interface nodes) causes this error; "
+        cause = f"the mesh ({int(batch.facts[MeshFact.N_NODES, case])} interface nodes) causes this error; "
         finding = findings.Missed(None, (), model, missed, excess).make_finding(
             Advice(cause + advice)
         )

@@ -9,6 +9,7 @@ from time import process_time
 
 import numpy as np
 
+from ...core import Response
 from ...motion_measures import energy_balance
 from ...response.loops import (
     find_reversals,
@@ -26,7 +27,7 @@ from ...response.measures import (
     work_difference,
 )
 from ..results.patch_rows import Values
-from .engine import BenchEngine, choose_bench_engine
+from .engine import BenchEngine, choose_bench_engine, sample_path
 from .slides import SlideHistories, SlideTask, follow_path
 
 
@@ -43,7 +44,7 @@ class BenchRun:
     - seconds: CPU time [s].
     - first: index of the sample at which the last cycle starts.
     - engine: method that computed the friction force.
-    - shear_modes: number of shear modes of the pieces; None without modes.
+    - contact: contact points that followed the path; None for other methods.
     - join_error: largest error of a join that made room in a full list of bonds, relative to the load.
     """
 
@@ -61,8 +62,33 @@ class BenchRun:
     seconds: float
     first: int
     engine: BenchEngine
-    shear_modes: int | None = None
+    contact: object = None
     join_error: float = 0.0
+
+    @property
+    def last_cycle(self) -> Response:
+        """Histories of the last cycle as those of a rig without modes, whose output is the upper holder.
+
+        Further histories are the ledger and the normal load.
+        """
+        rows = slice(self.first, None)
+        slide = self.slide[rows]
+        rate = self.rate[rows]
+        still = np.zeros(slide.size)
+        return Response(
+            time=self.time[rows],
+            modal=np.zeros((slide.size, 0)),
+            modal_rate=np.zeros((slide.size, 0)),
+            slide=slide,
+            slide_rate=rate,
+            output=slide,
+            output_rate=rate,
+            acceleration=still,
+            base_acceleration=still,
+            force=self.force[rows],
+            slip=self.slip[rows],
+            extra={"ledger": self.ledger[:, rows], "normal_load": self.load[rows]},
+        )
 
 
 def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) -> BenchRun:
@@ -94,14 +120,7 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
         If the force of a step has too large an error.
     """
     begin = process_time()
-    time, slide, first, omega = model.slide.samples(steps) if path is None else path
-
-    # A varying load bends the force between the samples of the slide.
-    if model.load_varies:
-        start = time[first]
-        time, slide = model.point.refine_samples(model.slide, time, slide, steps)
-        first = int(np.searchsorted(time, start))
-
+    time, slide, first, omega = sample_path(model, steps, path)
     engine = choose_bench_engine(model, slide, settings.pop("choice", None))
     engine = replace(engine, has_half_cells=settings.pop("has_half_cells", False))
     stored = _choose_frames(slide.size, frames)

@@ -132,7 +132,7 @@ def make_contact(model, patch, choice=None, *, has_half_cells: bool = False) -> 
     surface = place_surface(model, patch, surface)
     limit = model.friction.static * float(force.sum())
     if model.grooves is not None:
-        limit = model.grooves.max_force(fields["preload"], model.friction.static)
+        limit = model.grooves.max_force(float(force.sum()), model.friction.static)
     return join_points([make_points(model, surface)], limit, fields)
 
 
@@ -164,11 +164,11 @@ def place_surface(model, patch, surface: Surface) -> Surface:
         The surface under its mean load.
     """
     rise = 1.0
+    if model.load_varies:
+        rise = float(model.point.evaluate(np.zeros(1))[0] / model.point.load)
     if model.grooves is not None:
         # The points carry the normal force on the flank.
-        rise = float(np.hypot(1.0, model.grooves.slope(0.0)))
-    elif model.load_varies:
-        rise = float(model.point.evaluate(np.zeros(1))[0] / model.point.load)
+        rise *= float(np.hypot(1.0, model.grooves.slope(0.0)))
     lower = None
     if patch is not None and model.grooves is None and patch.model.gap.side == "lower":
         lower = _place_on_lower_piece(patch, surface)
@@ -177,13 +177,14 @@ def place_surface(model, patch, surface: Surface) -> Surface:
 
 def find_load_fields(model, patch) -> dict:
     """Return the fields of a Contact that describe a load that follows from time, the place, or the flank of a groove."""
+    fields = {}
     if model.grooves is not None:
         load = model.point.load if patch is None else float(patch.pressure.load)
-        return {"grooves": shear.find_climbed_grooves(model), "preload": load}
+        fields |= {"grooves": shear.find_climbed_grooves(model), "preload": load}
     if model.load_varies:
         preload = float(model.point.evaluate(np.zeros(1))[0])
-        return {"load": model.point.evaluate, "preload": preload}
-    return {}
+        fields |= {"load": model.point.evaluate, "preload": preload}
+    return fields
 
 
 def _place_on_lower_piece(patch, surface: Surface) -> contacts.LowerPressure:

@@ -168,6 +168,42 @@ def nodal_element_limit(model, patch):
     return model.friction.static * patch.pressure.sigma_n if is_exact else None
 
 
+class SlideSamples(NamedTuple):
+    """Samples of the path of a bench.
+
+    - time, slide (k,): times [s] and displacements [m].
+    - first: index of the sample at which the last cycle starts.
+    - omega: circular frequency of the cycle [rad/s]; 0 for a path that is not cyclic.
+    """
+
+    time: np.ndarray
+    slide: np.ndarray
+    first: int
+    omega: float
+
+
+def sample_path(model, steps: int, path: tuple | None = None) -> SlideSamples:
+    """Return the samples of a path, to which a varying load adds some.
+
+    It bends the force between the samples of the slide.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a bench.
+    steps : int
+        Steps per cycle.
+    path : tuple, optional
+        Path in the form of `SlidePath.samples`; default: that of the model.
+    """
+    time, slide, first, omega = path or model.slide.samples(steps)
+    if model.load_varies:
+        start = time[first]
+        time, slide = model.point.refine_samples(model.slide, time, slide, steps)
+        first = int(np.searchsorted(time, start))
+    return SlideSamples(time, slide, first, omega)
+
+
 class BenchSizes(NamedTuple):
     """Sizes of a bench run.
 
@@ -183,16 +219,13 @@ class BenchSizes(NamedTuple):
 
 def count_bench_sizes(model) -> BenchSizes:
     """Count the unknowns and the samples of a bench run."""
-    per_cycle = steps_per_cycle(model)
-    time, slide = model.slide.samples(per_cycle)[:2]
-    if model.load_varies:
-        time, slide = model.point.refine_samples(model.slide, time, slide, per_cycle)
+    slide = sample_path(model, steps_per_cycle(model)).slide
     engine = choose_bench_engine(model, slide)
     # The comparison runs keep their samples.
     unknowns = {}
     if engine.choice is not None and engine.choice.strips:
         unknowns["bond_list_about"] = int(engine.choice.strips)
-    return BenchSizes(engine.name, unknowns, time.size)
+    return BenchSizes(engine.name, unknowns, slide.size)
 
 
 def compute_dimensionless_groups(model) -> dict[str, float]:

@@ -113,10 +113,12 @@ def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndar
     snapshots : sequence of time_steps.time_march.Snapshot
         States of the points in the f frames.
     """
-    reduction = contact.reduction
-    index = np.arange(patch.x.size) if reduction is None else reduction.points
+    index = np.arange(patch.x.size)
+    if contact.reduction is not None:
+        index = np.concatenate([point_set.shear.points for point_set in contact.first_sets])
     slide = np.array([snapshot.slide for snapshot in snapshots])[:, None]
     shape = (len(snapshots), index.size)
+    moves = np.reshape([snapshot.moves for snapshot in snapshots], shape)
     forces = np.reshape([snapshot.forces for snapshot in snapshots], shape)
     elastic = np.reshape([snapshot.stretch + snapshot.bend for snapshot in snapshots], shape)
     if contact.grooves is not None:
@@ -129,7 +131,7 @@ def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndar
     tau = np.zeros((len(snapshots), patch.x.size))
     local = tau + slide
     tau[:, index] = forces / patch.pieces.interface.weight[index]
-    local[:, index] -= elastic
+    local[:, index] = moves - elastic
     return tau, local
 
 

@@ -40,7 +40,7 @@ class SlideHistories(NamedTuple):
     - slip (k,): irreversible part of the displacement [m].
     - ledger (4, k): cumulative work, stored energy, cumulative dissipated and created energy [J].
     - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
-    - shear_modes: number of shear modes of the pieces; None without modes.
+    - contact: contact points that followed the path; None for other methods.
     - join_error: largest error of a join that made room in a full list of bonds, relative to the load.
     """
 
@@ -50,7 +50,7 @@ class SlideHistories(NamedTuple):
     ledger: np.ndarray
     tau: np.ndarray
     local: np.ndarray
-    shear_modes: int | None = None
+    contact: "time_steps.contacts.Contact | None" = None
     join_error: float = 0.0
 
 
@@ -411,10 +411,8 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
         local = task.slide[frames, None] - stretch
     work = motion.mean * np.diff(task.slide)
     ledger = stack_energies(work, motion.stored, motion.losses)
-    shape = contact.point_sets[0].shear
-    count = None if shape is None else shape.stiffness.size
     return SlideHistories(
-        motion.force, load, local_slip, ledger, tau, local, count, motion.join_error
+        motion.force, load, local_slip, ledger, tau, local, contact, motion.join_error
     )
 
 

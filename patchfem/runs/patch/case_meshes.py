@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
+from ...mesh.grading import Layout
 from . import grids, mesh_levels
-from .cases import Batch, CaseMeasures, Cases, make_cases, take_patch
+from .cases import Batch, CaseMeasures, Cases, MeshFact, make_cases, take_patch
 from .condensed import CondensedPair, condense
 from .measures import (
     MIN_CONTACT_EDGE_ERROR_IN_CELLS,
@@ -22,7 +23,7 @@ from .measures import (
     max_mesh_error_ratio,
 )
 from .press import Level, PressedCases, make_level, press_on_level
-from .values import find_contact_edges
+from .values import contact_reaches_steep_end, find_contact_edges
 
 # Largest number of contacts for which the meshes of many cases are graded: half of them equally spaced in the order of
 # their left ends, half in that of their right ends
@@ -71,13 +72,6 @@ def find_contact_places(pressed: PressedCases) -> ContactPlaces:
     return ContactPlaces(pressed.active[:, 0], np.where(edges.exists, crossings, np.nan))
 
 
-def find_outer_nodes(pressed: PressedCases) -> np.ndarray:
-    """Return the positions [m] of the first and the last node in contact, (n, 2) for n cases."""
-    active = pressed.active
-    last = active.shape[1] - 1 - active[:, ::-1].argmax(axis=1)
-    return pressed.x[np.stack([active.argmax(axis=1), last], axis=1)]
-
-
 def join_places(parts: list[ContactPlaces]) -> ContactPlaces:
     """Return the contacts of several parts of the cases one after the other."""
     counts = [part.crossings.shape for part in parts]
@@ -87,6 +81,33 @@ def join_places(parts: list[ContactPlaces]) -> ContactPlaces:
         crossings[first : first + n_contacts, :n_crossings] = part.crossings
         first += n_contacts
     return ContactPlaces(np.concatenate([part.begins for part in parts]), crossings)
+
+
+def find_contact(patch_model, number: int, pressed: PressedCases, row: int) -> grids.SolvedContact:
+    """Return the contact of a case for which a mesh is graded.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch of all cases.
+    number : int
+        Number of the case.
+    pressed : PressedCases
+        Pressed cases.
+    row : int
+        Row of the case in `pressed`.
+    """
+    extent = grids.find_contact_extent(pressed, row)
+    return grids.SolvedContact(take_patch(patch_model, number), [extent])
+
+
+def collect_facts(pressed: PressedCases) -> np.ndarray:
+    """Return what texts state about the mesh of pressed cases, as rows `MeshFact` (f, n)."""
+    facts = np.zeros((len(MeshFact), len(pressed)))
+    facts[MeshFact.N_NODES] = pressed.x.size
+    facts[MeshFact.COUPLING] = pressed.level.pair.coupling
+    facts[MeshFact.STEEP_END] = contact_reaches_steep_end(pressed)
+    return facts
 
 
 class PressedParts(NamedTuple):
@@ -125,10 +146,23 @@ def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
         for number in range(count):
             solver.solve_alone(number)
     elif patch_model.mesh.is_automatic:
-        solver.solve(np.arange(count))
+        solver.solve()
     else:
         solver.solve_on_given_meshes()
     return solver.batch
+
+
+class _Group(NamedTuple):
+    """Cases that have the same meshes.
+
+    - numbers (k,): numbers of the cases.
+    - layout: columns of their coarsest mesh.
+    - places: where the contacts begin and end from which the search on that mesh starts; None if nothing is known.
+    """
+
+    numbers: np.ndarray
+    layout: Layout
+    places: ContactPlaces | None = None
 
 
 class _CaseSolver:
@@ -149,24 +183,37 @@ class _CaseSolver:
         self.cases = cases
         self.tolerance = tolerance
         self.batch = Batch.blank(cases.n_cases)
-        self.ends = np.zeros(
-            (cases.n_cases, 2)
-        )  # positions [m] of the first and last node in contact
+        self.contacts: dict[int, grids.SolvedContact] = {}
 
-    def solve(self, numbers: np.ndarray) -> None:
-        """Solve the cases `numbers` (k,) on common meshes, and those that miss the tolerance in smaller groups."""
-        if numbers.size < 2:
+    def solve(self) -> None:
+        """Solve the cases on meshes that they share, and those that miss the tolerance on meshes of smaller groups."""
+        numbers = np.arange(self.cases.n_cases)
+        search = _ContactSearch(self.patch_model, self.cases, numbers)
+        layout, contact = grids.search_layout(self.patch_model, search.find_contacts)
+        # Nothing is loaded, or no case can be pressed; the single runs tell why
+        if contact is None:
             for number in numbers.tolist():
                 self.solve_alone(number)
             return
-        missing = self._solve_together(numbers)
-        if not missing.size:
-            return
-        # Cases whose contacts end at similar places get common meshes: the ends that differ most are sorted
-        ends = self.ends[missing]
-        side = np.ptp(ends, axis=0).argmax()
-        for part in np.array_split(missing[np.argsort(ends[:, side], kind="stable")], 2):
-            self.solve(part)
+        groups = [_Group(numbers, layout, search.guess_places())]
+        while groups:
+            missing = self._solve_group(groups.pop())
+            # A case that is alone has reached the limit of the mesh
+            if missing.size:
+                groups += self._divide(missing)
+
+    def _divide(self, numbers: np.ndarray) -> "list[_Group]":
+        """Divide cases (k,) into two groups whose contacts end at similar places, with meshes for these contacts."""
+        spans = np.array([self.contacts[number].extents[0].span for number in numbers.tolist()])
+        side = np.ptp(spans, axis=0).argmax()
+        order = np.argsort(spans[:, side], kind="stable")
+        groups = []
+        for rows in np.array_split(order, 2):
+            spread = np.linspace(0, rows.size - 1, min(rows.size, MAX_GRADED_CONTACTS))
+            graded = numbers[rows[spread.round().astype(int)]].tolist()
+            layout = grids.make_common_layout([self.contacts[number] for number in graded])
+            groups.append(_Group(numbers[rows], layout))
+        return groups
 
     def solve_alone(self, number: int) -> None:
         """Solve one case like a single run."""
@@ -182,24 +229,20 @@ class _CaseSolver:
         columns += [[one.floor for one in measures]]
         values, errors, floors = np.array(columns, float)[:, :, None]
         excess = np.array([max_mesh_error_ratio(fine.measures, self.tolerance)])
-        found = CaseMeasures(tuple(fine.measures), values, errors, floors, excess)
-        self.batch.put(np.array([number]), found, fine.x.size)
+        found = CaseMeasures(
+            tuple(fine.measures), values, errors, floors, excess, collect_facts(fine.pressed)
+        )
+        self.batch.put(np.array([number]), found)
 
-    def _solve_together(self, numbers: np.ndarray) -> np.ndarray:
-        """Solve cases (k,) on common meshes; return the numbers of those that miss the tolerance.
+    def _solve_group(self, group: "_Group") -> np.ndarray:
+        """Solve cases on the meshes of a group; return the numbers of those that miss the tolerance, and can be divided.
 
         Each further mesh halves the cells for the cases that miss the tolerance on the one before.
         """
-        search = _ContactSearch(self.patch_model, self.cases.take(numbers), numbers)
-        layout, contact = grids.search_layout(self.patch_model, search.find_contacts)
-        # Nothing is loaded, or no case can be pressed; the single runs tell why
-        if contact is None:
-            for number in numbers.tolist():
-                self.solve_alone(number)
-            return numbers[:0]
-
-        bodies = grids.make_grids(self.patch_model, layout)
-        places = search.guess_places()
+        numbers = group.numbers
+        max_nodes = MAX_SHARED_NODES if numbers.size > 1 else np.inf
+        bodies = grids.make_grids(self.patch_model, group.layout)
+        places = group.places
         series: list[MeshValues] = []
         while True:
             pair = condense(self.patch_model, *bodies, keep_factors=False)
@@ -210,10 +253,10 @@ class _CaseSolver:
             series = [*series, values]
 
             bodies = [body.refine() for body in bodies]
-            is_last = bodies[0].x.size > MAX_SHARED_NODES
+            is_last = bodies[0].x.size > max_nodes
             is_last |= mesh_levels.is_too_expensive(self.patch_model, bodies)
             if is_judged and (is_last or not is_missing.any()):
-                return numbers[is_missing]
+                return numbers[is_missing] if group.numbers.size > 1 else numbers[:0]
             numbers = numbers[is_missing]
             series = [mesh.take(is_missing) for mesh in series]
             places = places.take(is_missing)
@@ -266,10 +309,12 @@ class _CaseSolver:
             pressed, errors = press_on_level(level, cases, start)
             values.append(collect_mesh_values(pressed))
             found_places.append(find_contact_places(pressed))
-            self.ends[numbers[rows]] = find_outer_nodes(pressed)
             if is_judged:
                 own = [*(mesh.take(rows) for mesh in series), values[-1]]
                 is_missing[rows] = self._keep_measures(numbers[rows], pressed, own, errors)
+                for row in np.flatnonzero(is_missing[rows]):
+                    number = int(numbers[rows[row]])
+                    self.contacts[number] = find_contact(self.patch_model, number, pressed, row)
             for row, error in errors.items():
                 is_missing[rows[row]] = False
                 self.batch.fail(int(numbers[rows[row]]), error)
@@ -301,10 +346,11 @@ class _CaseSolver:
             estimates.errors,
             estimates.floors(self.tolerance, length),
             excess,
+            collect_facts(pressed),
         )
         is_solved = np.ones(len(pressed), bool)
         is_solved[list(errors)] = False
-        self.batch.put(numbers[is_solved], found.take(is_solved), pressed.x.size)
+        self.batch.put(numbers[is_solved], found.take(is_solved))
         return excess > 1
 
 
@@ -345,9 +391,7 @@ class _ContactSearch:
         is_loaded[list(errors)] = False
         contacts = []
         for row in _spread_contacts(pressed.active, np.flatnonzero(is_loaded)):
-            model = take_patch(self.patch_model, self.numbers[row])
-            extent = grids.find_contact_extent(pressed, row)
-            contacts.append(grids.SolvedContact(model, [extent]))
+            contacts.append(find_contact(self.patch_model, int(self.numbers[row]), pressed, row))
         return contacts
 
     def guess_places(self) -> ContactPlaces:

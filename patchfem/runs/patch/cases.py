@@ -206,12 +206,26 @@ def make_gap_shapes(patch_model: PatchModel, x, end_gap) -> np.ndarray:
     return np.array(shapes).reshape(-1, x.size)
 
 
+class MeshFact(IntEnum):
+    """Rows of `Batch.facts`: what texts state about the finest mesh of a case.
+
+    - N_NODES: number of interface nodes.
+    - COUPLING: coupling of shear and normal motion (`CondensedPair.coupling`).
+    - STEEP_END: 1 if the contact reaches the steep part of a rounded end, else 0.
+    """
+
+    N_NODES = 0
+    COUPLING = 1
+    STEEP_END = 2
+
+
 class CaseMeasures(NamedTuple):
     """Measures of k cases on one mesh, as arrays (r, k) of r measures in SI units.
 
     - names: names of the measures.
     - values, errors, floors: NaN where there is none.
     - excess (k,): largest ratio of error to allowed error of the measures that control the mesh.
+    - facts (f, k): rows `MeshFact` of the mesh.
     """
 
     names: tuple[str, ...]
@@ -219,6 +233,7 @@ class CaseMeasures(NamedTuple):
     errors: np.ndarray
     floors: np.ndarray
     excess: np.ndarray
+    facts: np.ndarray
 
     def take(self, rows) -> "CaseMeasures":
         """Return selected cases; `rows` are indices or a mask (k,)."""
@@ -234,7 +249,7 @@ class Batch:
     - excess (n,): largest ratio of error to allowed error of the measures for which the mesh is refined; above 1 the
       case misses its tolerance, and a case that failed has inf.
     - outcome (n,) of int8: `OutcomeCode`; reason (n,) of int8: `Reason`.
-    - n_nodes (n,): number of interface nodes of the finest mesh of each case.
+    - facts (f, n): rows `MeshFact` of the finest mesh of each case.
     - messages: error of each case that failed, by its number; a single run raises it.
     """
 
@@ -244,7 +259,7 @@ class Batch:
     excess: np.ndarray
     outcome: np.ndarray
     reason: np.ndarray
-    n_nodes: np.ndarray
+    facts: np.ndarray
     messages: dict[int, PatchfemError] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -260,10 +275,10 @@ class Batch:
             np.full(count, np.inf),
             np.full(count, OutcomeCode.FAILED, np.int8),
             np.full(count, Reason.NOT_CONVERGED, np.int8),
-            np.zeros(count, int),
+            np.zeros((len(MeshFact), count)),
         )
 
-    def put(self, numbers: np.ndarray, measures: CaseMeasures, n_nodes: int) -> None:
+    def put(self, numbers: np.ndarray, measures: CaseMeasures) -> None:
         """Store measures of some cases whose errors are smaller than those that they have.
 
         Parameters
@@ -272,8 +287,6 @@ class Batch:
             Numbers of the cases.
         measures : CaseMeasures
             Their measures on a mesh.
-        n_nodes : int
-            Number of interface nodes of the mesh.
         """
         rows = np.flatnonzero(measures.excess < self.excess[numbers])
         cases = numbers[rows]
@@ -284,7 +297,7 @@ class Batch:
                 columns[name][cases] = row[rows]
 
         self.excess[cases] = measures.excess[rows]
-        self.n_nodes[cases] = n_nodes
+        self.facts[:, cases] = measures.facts[:, rows]
         self.reason[cases] = np.where(measures.excess[rows] > 1, Reason.MESH_LIMIT, Reason.NONE)
         self.outcome[cases] = OutcomeCode.DONE
         for name in POSITIVE_MESH_MEASURES:

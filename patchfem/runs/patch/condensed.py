@@ -15,7 +15,6 @@ from ...elasticity import mortar
 from ...elasticity.elasticity import Piece, compute_interface_compliance
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_elastic_layers
-from . import store
 
 # Largest coupling of equal pieces, relative to their compliance, that is round-off of the coordinates in a mesh file
 RELATIVE_COUPLING_ROUND_OFF = 1e-7
@@ -155,25 +154,6 @@ def condense(patch_model, grid, upper_grid=None, *, keep_factors: bool = True) -
         joint,
         frozen_array(end_gap),
         seconds,
-    )
-
-
-def condense_once(patch_model, grid, upper_grid=None) -> CondensedPair:
-    """Condense the two pieces of a `PatchModel` on meshes that several patches share, or return the result from before.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch whose materials, width and coatings the pieces have.
-    grid, upper_grid : TensorGrid or PieceMesh
-        Meshes of the lower and the upper piece. The upper one is None if the pieces are identical.
-    """
-
-    pieces = patch_model.pieces
-    width = pieces.width * pieces.pairs
-    key = ("pair", grid, upper_grid, pieces.lower, pieces.upper, pieces.plane, width)
-    return store.get_or_compute(
-        key, lambda: condense(patch_model, grid, upper_grid, keep_factors=False)
     )
 
 

@@ -202,7 +202,7 @@ def search_layout(
         if not solved:
             break
         contact = solved[0].extents[0]
-        layout = _merge_layouts([make_column_layout(*one) for one in solved])
+        layout = make_common_layout(solved)
 
         # The search ends when this grid has resolved all contacts.
         max_ratio = 1 / (choose_density(patch_model).n_edge_cells - 1)
@@ -214,6 +214,11 @@ def search_layout(
         if is_resolved:
             break
     return layout, contact
+
+
+def make_common_layout(solved: list[SolvedContact]) -> Layout:
+    """Return the columns of the coarsest grid for the contacts of patches of equal geometry."""
+    return _merge_layouts([make_column_layout(*one) for one in solved])
 
 
 def find_contacts_alone(patch_models: list[PatchModel], pair: CondensedPair) -> list[SolvedContact]:

@@ -26,7 +26,7 @@ from ..results.patch_rows import (
     Values,
     make_measure,
 )
-from .condensed import CondensedPair, condense_once
+from .condensed import CondensedPair, condense
 from .limits import extrapolate_to_zero_cell_length
 from .press import Patch, Patches, PressedCases, solve_patch_contact
 from .values import (
@@ -757,7 +757,7 @@ def note_on_plane_state(patch_model, patch: Patch) -> list[str]:
     # them.
     other_model = replace(patch_model, pieces=replace(pieces, plane=other_plane))
     try:
-        pair = condense_once(other_model, *patch.pair.meshes)
+        pair = condense(other_model, *patch.pair.meshes, keep_factors=False)
         other_values = compute_static_values(solve_patch_contact(other_model, pair, coarse=patch))
     except PatchfemError as error:
         return [

@@ -12,13 +12,16 @@ from ...mesh import pieces as piece_meshes
 from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
 from . import area, profile_points, store
-from .condensed import CondensedPair, condense, condense_once
+from .condensed import CondensedPair, condense
 from .grids import (
     COARSE_GRID_DENSITY,
     MIN_NESTED_MESHES,
     choose_density,
+    find_contacts_alone,
     make_base_grids,
+    make_grids,
     predict_condensing_seconds,
+    search_layout,
 )
 from .measures import max_mesh_error_ratio, with_static_measures
 from .press import Patch, Patches, solve_patch_contact
@@ -39,13 +42,12 @@ def solve_with_coarser(
 
     If the element size is not prescribed, nested meshes are refined until the patch meets the
     tolerance. An unstructured mesh has no coarser one; its second solution is on the mesh with all
-    edges halved. Shared meshes are used as they are, unless they do not resolve a profile to the tolerance.
-    In this case the patch gets its own meshes, as in a single run.
+    edges halved.
 
     Parameters
     ----------
     patch_model : PatchModel
-        Patch to solve, with its mesh, shared mesh or element size.
+        Patch to solve, with its mesh or element size.
     tolerance : float
         Relative error that the static measures have to meet.
     with_errors : bool
@@ -62,36 +64,24 @@ def solve_with_coarser(
     mesh = patch_model.mesh
 
     def solve() -> Patches:
-        """Solve the patch on its own meshes, on those that the scene prescribes, or on those that cases share."""
+        """Solve the patch on its own meshes or on those that the scene prescribes."""
         if patch_model.area is not None:
             return solved or area.solve_face_on_grids(
                 patch_model, tolerance, with_errors=with_errors
             )
-        if mesh.shared is None and mesh.is_automatic:
+        if mesh.is_automatic:
             return solve_on_refined_meshes(patch_model, tolerance, with_errors, solved)
-        levels = (mesh.shared or make_given_meshes(patch_model))[: None if with_errors else 1]
-        if mesh.shared is not None:
-            pairs = [condense_once(patch_model, *level) for level in levels]
-        else:
-            # Only the finest mesh needs factors, for the stress inside the pieces. The patches of many rigs do not keep
-            # them.
-            pairs = [
-                condense(patch_model, *level, keep_factors=mesh.is_fine and level is levels[0])
-                for level in levels
-            ]
+        # Only the finest mesh needs factors, for the stress inside the pieces. The patches of many rigs do not keep them.
+        levels = make_given_meshes(patch_model)[: None if with_errors else 1]
+        pairs = [
+            condense(patch_model, *level, keep_factors=mesh.is_fine and level is levels[0])
+            for level in levels
+        ]
         return solve_on_pairs(patch_model, pairs, tolerance)
 
-    # Many runs of a rig have the same patch, whose coarse mesh needs little memory
-    if mesh.is_fine and mesh.shared is None:
-        return solve()
+    # Many runs of a rig or of a bench have the same patch. That of a bench has large factors, so that only one stays.
     key = ("patches", store.content_key(patch_model), tolerance, with_errors)
-    patches = store.get_or_compute(key, solve)
-    has_profile = (
-        mesh.is_automatic and mesh.shared is not None and patch_model.gap.profile is not None
-    )
-    if has_profile and max_mesh_error_ratio(patches[0].measures, tolerance) > 1:
-        return solve_on_refined_meshes(patch_model.with_mesh(shared=None), tolerance)
-    return patches
+    return store.get_or_compute(key, solve, is_large=mesh.is_fine)
 
 
 def solve_on_pairs(patch_model, pairs, tolerance: float) -> Patches:
@@ -160,6 +150,25 @@ def solve_on_other_mesh(patch: Patch, tolerance: float) -> Patch:
         raise PatchfemError(f"the mesh has only {n_columns} columns; use smaller elements", "")
     pair = condense(patch.model, *_change_elements(patch.pair.meshes))
     return solve_on_pairs(patch.model, [pair], tolerance)[0]
+
+
+def condense_for_contacts(patch_models) -> CondensedPair | None:
+    """Condense the pieces of several patches on a mesh that is graded to the contacts of all of them.
+
+    The mesh is as fine as that of a patch without error estimates. The result is None for patches with different pieces
+    or steps, and for faces.
+    """
+    geometries = {(patch.pieces, patch.gap.step_edges) for patch in patch_models}
+    if len(geometries) != 1 or patch_models[0].area is not None:
+        return None
+    first = patch_models[0]
+    if not first.mesh.is_automatic:
+        return condense(first, *make_piece_meshes(first))
+    layout, _ = search_layout(first, partial(find_contacts_alone, patch_models))
+    bodies = make_grids(first, layout)
+    for _ in range(MIN_NESTED_MESHES - 1):
+        bodies = [body.refine() for body in bodies]
+    return condense(first, *bodies)
 
 
 def solve_on_refined_meshes(

@@ -33,8 +33,6 @@ def _predict_finest_mesh(patch_model, tolerance: float) -> "Sequence[piece_meshe
     A mesh file is not read. An automatic mesh takes its place. `tolerance` is the relative error that the static
     measures have to meet.
     """
-    if patch_model.mesh.shared is not None:
-        return patch_model.mesh.shared[0]
     if not patch_model.mesh.is_automatic:
         return make_piece_meshes(patch_model.with_mesh(file=None))
     bodies, contact = make_base_grids(patch_model)

@@ -23,6 +23,11 @@ MAX_POISSON_RATIO = 0.499
 # Largest strain at which second-order effects may be neglected.
 MAX_SMALL_STRAIN = 0.02
 
+STEEP_END_WARNING = (
+    "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
+    "contact is computed; lower the tilt or the load"
+)
+
 # Smallest ratio of normal to tangential displacement under a shear force that a note reports.
 MIN_REPORTED_NORMAL_COUPLING_RATIO = 0.02
 
@@ -73,10 +78,7 @@ def patch_warnings(patch_model, patch, *, has_error_mesh: bool = True) -> list[s
         patch_model, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach
     )
     if patch_model.area is None and contact_reaches_steep_end(patch.pressed).any():
-        warnings.append(
-            "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
-            "contact is computed; lower the tilt or the load"
-        )
+        warnings.append(STEEP_END_WARNING)
 
     warnings += warn_of_locking(patch_model)
 
@@ -185,14 +187,7 @@ def notes_on_neglected_effects(face) -> list[str]:
     if patch_model.area is not None:
         return out
 
-    # Coupling of shear and normal motion, which acts only between dissimilar pieces.
-    if patch.pair.coupling > MIN_REPORTED_NORMAL_COUPLING_RATIO:
-        out.append(
-            "the pieces have different elasticity, which couples shear and normal motion; this coupling is "
-            f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "
-            "the largest slide"
-        )
-
+    out += note_on_coupling(patch.pair.coupling)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # An unstructured mesh has no coarser one: its second mesh is finer than its first. The coarsest
         # mesh of a fine series, and the next one of another, have 20 cells along the contact, which are
@@ -205,6 +200,19 @@ def notes_on_neglected_effects(face) -> list[str]:
             ("plane band", other), lambda: note_on_plane_state(patch_model, other)
         )
     return out
+
+
+def note_on_coupling(coupling: float) -> list[str]:
+    """Return a list with a note on the coupling of shear and normal motion, which acts only between dissimilar pieces.
+
+    `coupling` is the largest ratio of normal to tangential displacement under a shear force [1].
+    """
+    if coupling <= MIN_REPORTED_NORMAL_COUPLING_RATIO:
+        return []
+    return [
+        "the pieces have different elasticity, which couples shear and normal motion; this coupling is "
+        f"neglected; under a shear force the largest normal displacement is {coupling:.2g} times the largest slide"
+    ]
 
 
 def _describe_results_on_mesh(model, patch) -> str:

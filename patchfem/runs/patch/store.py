@@ -12,18 +12,40 @@ from typing import Any, TypeVar
 # to nine. One of the seven holds up to 300 MB on a fine mesh, most of which are factors of the stiffness.
 MAX_STORED_RESULTS = 48
 
+# Largest number of patches with factors of their stiffness: those of two passes of a bench, of which the second has factors
+MAX_LARGE_RESULTS = 2
+
 Key = tuple[Any, ...]  # plain values, the first one naming the kind of the result
 Result = TypeVar("Result")
 
 
 _RESULTS: dict[Key, Any] = {}  # Results from the least to the most recently used one.
+_LARGE_KEYS: list[Key] = []  # keys of the large results, from the oldest one
 
 
-def get_or_compute(key: Key, make: Callable[[], Result]) -> Result:
-    """Return the cached result of a key, which becomes the most recently used one; compute it on the first call."""
+def get_or_compute(key: Key, make: Callable[[], Result], *, is_large: bool = False) -> Result:
+    """Return the cached result of a key, which becomes the most recently used one; compute it on the first call.
+
+    Parameters
+    ----------
+    key : tuple
+        Plain values, the first one naming the kind of the result.
+    make : callable
+        Function without parameters that computes the result.
+    is_large : bool
+        Whether only the last MAX_LARGE_RESULTS results of this kind stay.
+
+    Returns
+    -------
+    object
+    """
     if key in _RESULTS:
         _RESULTS[key] = _RESULTS.pop(key)
         return _RESULTS[key]
+    if is_large:
+        while len(_LARGE_KEYS) >= MAX_LARGE_RESULTS:
+            _RESULTS.pop(_LARGE_KEYS.pop(0), None)
+        _LARGE_KEYS.append(key)
     _RESULTS[key] = result = make()
     if len(_RESULTS) > MAX_STORED_RESULTS:
         del _RESULTS[next(iter(_RESULTS))]
@@ -33,6 +55,7 @@ def get_or_compute(key: Key, make: Callable[[], Result]) -> Result:
 def clear_cache() -> None:
     """Discard all cached results of this process."""
     _RESULTS.clear()
+    _LARGE_KEYS.clear()
 
 
 def content_key(patch_model) -> Key:

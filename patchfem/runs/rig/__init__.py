@@ -1,15 +1,15 @@
-"""Motion of a rig: modes, drive and contact.
+"""Motion of a rig or a bench: modes, drive and contact, or contact under a prescribed slide.
 
-In: a Model with a rig, and its Patch. Out: a Result.
+In: a Model with a rig or a slide, and its Patch. Out: a Result.
 
 Start reading at `rig`. It runs the model with finer and finer numerical settings until the errors meet the tolerance,
 and then completes the result. The run and its coarse runs are each solved only once, by the engine. `engines` has the
-numerical settings, and a record for each engine with its comparison runs. `scene.rules.methods.ENGINE_SUPPORT` lists what
-each engine can compute, and `runs.plan` the memory of its histories.
+numerical settings, and `comparisons` the coarser runs from which the errors follow. `scene.rules.methods.ENGINE_SUPPORT`
+lists what each engine can compute, and `runs.plan` the memory of its histories.
 
-Each engine has a module (`march`, `event_to_event` for the engine `hybrid`, and the folder `steady`), which prepares the
-integration in `time_steps` or `hybrid` and contains the measures that the engine computes itself. `evaluation` converts a
-run to a Solution, and continues a run from drive level to drive level. `joints` makes the laws and contact models of each
-engine from the friction of a patch. `bond_lists` has the length of a bond list, and the refusal of steps that are too long
-for it.
+Each engine has a module (`march`, `event_to_event` for the engine `hybrid`, `slides` for a bench, and the folder `steady`),
+which prepares the integration in `time_steps` or `hybrid` and contains the measures that the engine computes itself.
+`evaluation` converts a run to a Solution, and continues a run from drive level to drive level. `joints` makes the laws and
+contact models of each engine from the friction of a patch. `bond_lists` has the length of a bond list, and the refusal of
+steps that are too long for it.
 """

@@ -1,7 +1,7 @@
 """Average of the histories of bands of a face that slide independently.
 
 In: a run in which each band of cells is an interface, and the AreaPatch. Out: the run with the histories of a single
-interface. A band has the pressure of the coupled face, and its friction does not shear the other bands.
+interface. A band has the pressure of the coupled face; `[contact.shear]` couples the bands.
 """
 
 from dataclasses import replace

@@ -72,12 +72,15 @@ def make_contact(model: Model, numerics, patch):
             moves = "sets" in fields
             count = numerics.shear_modes
             sets = [make_points(model, part, count, moves=moves) for part in surfaces]
+            if rig.friction.bands_slide_apart and model.partial_slip:
+                sets = sets[0].split(bands.number_bands(patch)[sets[0].shear.points], rows)
 
     # Without friction the drive gives the scale of the forces.
     limit = sum(float(point_set.law.limits.sum()) for point_set in sets)
     scale = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     if model.grooves is not None:
-        limit = model.grooves.max_force(fields["preload"], model.friction.static)
+        load = model.point.load if patch is None else float(patch.pressure.load)
+        limit = model.grooves.max_force(load, model.friction.static)
     return join_points([*sets, *springs], limit or scale, fields)
 
 
@@ -106,8 +109,13 @@ def _find_load(model: Model, patch) -> dict:
 
 
 def _list_element_joints(model: Model, numerics, patch) -> list[joints.Joint]:
-    """Return the interfaces as joints of parallel elements where all that slip part by part have them; [] elsewhere."""
+    """Return the interfaces as joints of parallel elements where all that slip part by part have them; [] elsewhere.
+
+    Bands that yaw deform the same pieces, so that their elements are not parallel.
+    """
     interfaces = model.rig.friction.interfaces
+    if model.rig.friction.bands_slide_apart:
+        return []
     patches = [model.patch, *(interface.patch for interface in interfaces)]
     if any(part is not None and part.gap.side == "lower" for part in patches):
         return []

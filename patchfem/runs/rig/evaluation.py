@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ... import friction
+from ... import friction, structure
 from ...core import Measure, Outcome, Response, SineDrive
 from ...cost_model import measure_cpu_time
 from ...effects import law_has_trait
@@ -35,7 +35,6 @@ from ...response.loops import CycleLoop, reversal_force_rule, sample_loop
 from ...response.measures import Measures, Values, relative_gap
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.rows import AMPLITUDE, MOTION_TABLE, STEADY_AMPLITUDE, LastCycles, compute_measures
-from ...structure.drive_sizes import find_drive_omega, has_full_cycle, is_sinusoidal
 from ..results.result import Settings, SteadyData
 
 Fields = dict[str, Any]  # fields of a record by name
@@ -205,10 +204,12 @@ def compute_sampled_loop(window, drive, work: float, force=None) -> CycleLoop | 
     force : complex, optional
         First harmonic of the force [N], if it is known more accurately.
     """
-    if not has_full_cycle(window.time[-1] - window.time[0], drive):
+    if not structure.drive_sizes.has_full_cycle(window.time[-1] - window.time[0], drive):
         return None
     force = window.force if force is None else force
-    return sample_loop(window.time, window.slide, force, find_drive_omega(drive), work)
+    return sample_loop(
+        window.time, window.slide, force, structure.drive_sizes.find_drive_omega(drive), work
+    )
 
 
 def compute_peak_frequency(solution: Solution, coarser=()) -> Measures:
@@ -387,7 +388,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
     """
     drive = evaluator.model.rig.drive
     amplitudes = drive.levels.amplitudes
-    omega = find_drive_omega(drive.signal)
+    omega = structure.drive_sizes.find_drive_omega(drive.signal)
     runs = []
     level_results = []
 
@@ -604,7 +605,7 @@ class RunEvaluator:
             extremes=run.extremes[-n_cycles:],
             load=first_interface_load(model, self.patch),
             stiffness=first_mode_stiffness(model, window),
-            is_sine=is_sinusoidal(drive),
+            is_sine=structure.drive_sizes.is_sinusoidal(drive),
             **fields,
         )
         return compute_measures(last_cycles)

@@ -14,7 +14,6 @@ from ..results.patch_rows import Arrays
 from ..results.result import (
     N_INTERFACE_FRAMES,
     SlipRule,
-    collect_rest_frame,
     compute_status,
     make_interface_frames,
 )
@@ -37,9 +36,6 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     sigma = patch.pressure.sigma_n
     f = model.friction
     window = solution.window
-    # Bands that slide independently have no common shear stress.
-    if model.partial_slip and model.rig.friction.bands_slide_apart:
-        return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)
     # A motion without snapshots is that of a single point.
@@ -67,7 +63,9 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
         reduction = getattr(solution.contact, "reduction", None)
-        length = 0.0 if reduction is None else friction.record.make_law(f).length
+        length = (
+            0.0 if reduction is None else friction.record.make_law(f, patch.pressure.load).length
+        )
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
         tau, local = slip.fields.compute_element_fields(patch, reduction, states, length)
         if model.patch.area is None:

@@ -20,7 +20,6 @@ from ...hybrid.laws import grooves, masing
 from ...hybrid.records import LawNumbers
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
-from ...model.structure import N_YAW_BANDS
 from ..bench import averaged_law
 from ..patch import faces, jenkins_elements
 from . import bands, bond_lists
@@ -199,21 +198,13 @@ def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
     The elements are those of a patch that slips node by node, as the last fields of a Joint: stiffness, yield
     displacement and JenkinsSet. They are () for a patch that slips as a whole.
     """
-    slide_apart = model.rig.friction.bands_slide_apart
+    if model.rig.friction.bands_slide_apart:
+        return [(Load(float(load)), ()) for load in bands.compute_band_loads(patch)]
     load = Load(float(patch.pressure.load))
     if not (model.partial_slip and has_elements(model.friction)):
-        if not slide_apart:
-            return [(load, ())]
-        return [(Load(float(load)), ()) for load in bands.compute_band_loads(patch)]
-
-    static = model.friction.static
+        return [(load, ())]
     length = friction.record.make_law(model.friction, load.mean).length
-    if slide_apart:
-        numbers = bands.number_bands(patch)
-        found = jenkins_elements.elements(patch, static, length)
-        parts = slip.first_loading.list_band_sliders(found, numbers, N_YAW_BANDS)
-        return [(load, part) for part in parts]
-    return [(load, jenkins_elements.make_elements(patch, static, length))]
+    return [(load, jenkins_elements.make_elements(patch, model.friction.static, length))]
 
 
 # ---- engine `hybrid`

@@ -88,7 +88,7 @@ class MarchEvaluator(RunEvaluator):
         """
         rig = self.model.rig
         numerics = self.numerics
-        # Strips that slide independently have no common shear stress, so no output frames are stored.
+        # Rigid bands that slide independently have no common shear stress, so no output frames are stored.
         slide_apart = rig.friction.bands_slide_apart
         travel = find_travel(rig)
         run = engine.march(
@@ -100,7 +100,7 @@ class MarchEvaluator(RunEvaluator):
             window=numerics.window,
             travel=travel,
             start=rig.start if before is None else before.end,
-            frames=0 if slide_apart else frames,
+            frames=0 if slide_apart and not self.model.partial_slip else frames,
             keeps_samples=numerics.whole,
             progress=progress,
         )
@@ -109,7 +109,7 @@ class MarchEvaluator(RunEvaluator):
         if not slide_apart:
             return run
 
-        # Strips are averaged to a single interface, whose force is known at the samples.
+        # Bands are averaged to a single interface, whose force is known at the samples.
         run = bands.average_over_bands(run, self.patch)
         force = run.window.force
         return replace(run, step_force=(force[1:] + force[:-1]) / 2)

@@ -1,30 +1,39 @@
-"""Warnings and notes of a run of a rig on its friction law, load and engine.
+"""Warnings and notes of a run of a rig or a bench on its friction law, load and engine.
 
-In: a `rig.CoupledRun`. Out: sentences. MOTION_WARNINGS and MOTION_NOTES are the tables of conditions; each entry yields
-the sentences of a run that meets its condition. Those on the friction law are in `results.notes`.
+In: a `rig.CoupledRun`. Out: sentences. MOTION_WARNINGS and MOTION_NOTES are the tables of conditions of a rig,
+SLIDE_WARNINGS that of a bench; each entry yields the sentences of a run that meets its condition. Those on the friction law
+are in `results.notes`.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Outcome
+from ... import structure
+from ...core import NotConverged, Outcome
 from ...effects import law_has_trait
-from ...formatting import format_length, format_number
-from ...model.structure import N_YAW_BANDS
+from ...formatting import format_length, format_number, format_quantity
+from ...model import structure as model_structure
 from ...motion_measures import MAX_RESTING_SLIDE_RANGE
-from ...response.outcome import describe_ringing, find_ringing, note_on_changing_drive
+from ...response.outcome import (
+    OPEN_LOOP_MESSAGE,
+    describe_ringing,
+    find_ringing,
+    note_on_changing_drive,
+)
 from ...response.rows import AMPLITUDE
-from ...structure.drive_sizes import find_min_decay_rate
+from ..bench import bench
 from ..results.interfaces import Face, merge_sentences, warn_of_large_slide
-from ..results.notes import LawFacts, list_law_notes, list_law_warnings
-from ..results.result import Settings
+from ..results.notes import LAW_NOTES, LAW_WARNINGS
 from . import joints
 from .engines import ENGINES, find_obstacle_of_map
-from .evaluation import first_interface_load
 
+N_STEADY_CHECK_CYCLES = (
+    4  # Cycles that are added to see whether the last loop of a bench is steady.
+)
 SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 # Speed at half the friction limit of a law that creeps, relative to its reference speed: the inverse of tanh at 1/2.
 HALF_LIMIT_SPEED_RATIO = 0.5493
@@ -46,44 +55,14 @@ class Remarks(NamedTuple):
     notes: list[str]
 
 
-def collect_remarks(run, settings: Settings) -> Remarks:
-    """Return the warnings and notes of a run with its settings on its friction law, load, engine and end of motion."""
-    facts = collect_law_facts(run, settings)
-    structure = run.model.rig.structure
-    warnings = chain.from_iterable(find(run) for find in MOTION_WARNINGS)
-    notes = chain.from_iterable(find(run) for find in MOTION_NOTES)
+def collect_remarks(run) -> Remarks:
+    """Return the warnings and notes of a run on its friction law, load, engine and end of motion."""
+    is_bench = run.model.rig is None
+    warnings = SLIDE_WARNINGS if is_bench else MOTION_WARNINGS
+    notes = LAW_NOTES if is_bench else MOTION_NOTES
     return Remarks(
-        [*structure.notes, *list_law_warnings(facts), *warnings],
-        [*structure.reduction_notes, *list_law_notes(facts), *notes],
-    )
-
-
-def collect_law_facts(run, settings: Settings) -> LawFacts:
-    """Return what the warnings and notes on a friction law need: law, patch, measures, forces and energies of a run."""
-    model = run.model
-    solution = run.solution
-
-    # A limit that varies with the load cannot be compared with the largest force.
-    limit = 0.0
-    if run.has_friction:
-        limit = model.friction.static * first_interface_load(model, run.patch)
-    force_ratio = None
-    if limit > 0 and not model.rig.friction.load_varies:
-        force_ratio = float(np.abs(solution.response.force).max()) / limit
-
-    return LawFacts(
-        model=model,
-        patch=run.patch,
-        measures=run.measures,
-        outcome=run.outcome,
-        speed=float(np.abs(solution.window.slide_rate).max()),
-        force_ratio=force_ratio,
-        created=solution.book.get("created", 0.0),
-        exchanged=solution.book.get("passed", 0.0),
-        settings=settings,
-        time=solution.window.time,
-        slide=solution.window.slide,
-        slip=solution.window.slip,
+        list(chain.from_iterable(find(run) for find in warnings)),
+        list(chain.from_iterable(find(run) for find in notes)),
     )
 
 
@@ -127,7 +106,7 @@ def _warn_of_ringing(run) -> Iterator[str]:
     if model.rig.drive.levels.amplitudes:
         return
     tolerance = model.accuracy.tolerance
-    rate = find_min_decay_rate(model.rig.modes)
+    rate = structure.drive_sizes.find_min_decay_rate(model.rig.modes)
     ringing = find_ringing(run.solution, run.measures, (tolerance, rate), run.drive)
     if ringing:
         limits = (tolerance, rate * run.drive.period)
@@ -190,16 +169,80 @@ def _warn_of_large_slides(run) -> list[str]:
     )
 
 
-def _note_on_fields_of_bands(run) -> Iterator[str]:
-    """Note what bands that yaw neglect: the shear between them, and the fields of slip if they slip part by part."""
-    if not run.model.rig.friction.bands_slide_apart:
-        return
-    yield (
-        f"the face yaws as {N_YAW_BANDS} bands of cells, each with its part of the friction and stiffness of the whole "
-        "face; the shear between bands that slide apart is neglected"
+# ---- benches
+
+
+def _compute_loop_closing_error(fine) -> float:
+    """Return the relative difference between start and end of the last cycle.
+
+    It is the larger of the change of the force over its peak and the change of the stored energy
+    over the work.
+    """
+    force = fine.force[fine.first :]
+    work, stored, *_ = fine.ledger[:, fine.first :]
+    gap = 0.0
+    for change, size in (
+        (force[-1] - force[0], np.abs(force).max()),
+        (stored[-1] - stored[0], work[-1] - work[0]),
+    ):
+        if size:
+            gap = max(gap, abs(float(change / size)))
+    return gap
+
+
+def _warn_of_open_loop(run) -> list[str]:
+    """Return a list with a warning if the last friction loop of a bench is not closed, nor its area that of a longer run."""
+    model = run.model
+    fine = run.solution.response
+    tolerance = model.accuracy.tolerance
+    slide = model.slide
+    if slide.period is None or slide.cycles < 1 or not fine.values.get("loop_area"):
+        return []
+    gap = _compute_loop_closing_error(fine)
+    if gap <= tolerance:
+        return []
+    text = (
+        f"{OPEN_LOOP_MESSAGE}: it misses by {100 * gap:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction "
+        "work of the last cycle, is not the energy dissipated in a steady loop"
     )
-    if run.model.partial_slip:
-        yield "bands that slip part by part have no common shear stress, so the fields contain only the pressure"
+
+    # The comparison must not end a run that is complete.
+    cycles = slide.cycles + N_STEADY_CHECK_CYCLES
+    try:
+        longer = bench.run_bench(
+            replace(model, slide=replace(slide, cycles=cycles)), run.patch, run.numerics.steps
+        )
+    except NotConverged:
+        return [f"{text}; raise slide.cycles"]
+
+    # The loop is steady if the last two cycles of the longer run do the same work.
+    ends = longer.time[-1] - slide.period * np.arange(2, -1, -1)
+    before, area = np.diff(np.interp(ends, longer.time, longer.ledger[0])).tolist()
+    if abs(area - fine.values["loop_area"]) <= tolerance * abs(area):
+        return []
+    if abs(area - before) > tolerance * abs(area):
+        return [f"{text}; no steady loop is reached within {cycles:g} cycles"]
+    return [f"{text}, which is {format_quantity(area, 'J', 4)}; set slide.cycles = {cycles:g}"]
+
+
+def _warn_of_overhang(run) -> Iterator[str]:
+    """Warn if the upper piece of a bench slides off the loaded area."""
+    load = run.solution.response.load
+    load_loss = 1 - float(load.min() / load[0]) if load[0] > 0 else 0.0
+    if run.patch is not None and load_loss > 0.01:
+        yield (
+            "the upper piece slides off the pressed area: at worst the computed contact carries "
+            f"{100 * load_loss:.0f} % less than the given load"
+        )
+
+
+# ---- notes on rigs
+
+
+def _note_on_fields_of_bands(run) -> Iterator[str]:
+    """Note that bands yaw as a whole."""
+    if run.model.rig.friction.bands_slide_apart:
+        yield f"the face yaws as {model_structure.N_YAW_BANDS} bands of cells, each with the displacement of its middle"
 
 
 def _note_on_elements_without_slip(run) -> Iterator[str]:
@@ -252,7 +295,10 @@ def _note_on_end(run) -> Iterator[str]:
         yield run.solution.message
 
 
+SLIDE_WARNINGS = (*LAW_WARNINGS, _warn_of_open_loop, _warn_of_overhang, _warn_of_large_slides)
 MOTION_WARNINGS = (
+    lambda run: run.model.rig.structure.notes,
+    *LAW_WARNINGS,
     _warn_of_single_points,
     _warn_of_engine,
     _warn_of_peak_at_end_frequency,
@@ -261,6 +307,8 @@ MOTION_WARNINGS = (
     _warn_of_large_slides,
 )
 MOTION_NOTES = (
+    lambda run: run.model.rig.structure.reduction_notes,
+    *LAW_NOTES,
     _note_on_fields_of_bands,
     _note_on_elements_without_slip,
     _note_on_smallest_slip_of_onset,

@@ -1,7 +1,7 @@
-"""Run of a rig: solution with refined numerical settings, and completion of its result.
+"""Run of a rig or a bench: solution with refined numerical settings, and completion of its result.
 
 In: the inputs of a run, i.e. its plan and its pressed interfaces. Out: a Result. `run_refined` solves the run with finer and
-finer settings until its measures meet the tolerance; each coarse run is solved only once (`Runner`). `run_rig` completes
+finer settings until its measures meet the tolerance; each coarse run is solved only once (`Runner`). `run_motion` completes
 the result.
 """
 
@@ -10,16 +10,15 @@ from math import ceil, floor, log, log2
 
 import numpy as np
 
+from ... import structure
 from ...core import NotConverged, Outcome, PatchfemError
-from ...model.rig import MAX_COMPUTED_DISPLACEMENT
+from ...model import rig as model_rig
 from ...response import reasons, stationary
 from ...response.decay_curve import DecayCurve
 from ...response.errors import (
-    CoarserRuns,
     ComparisonRuns,
     SourceErrors,
     StepRun,
-    absolute_change,
     add_errors,
     add_run_error_estimates,
     estimate_errors,
@@ -29,14 +28,15 @@ from ...response.measures import Measures
 from ...response.outcome import judge_outcome, remove_errors
 from ...response.rows import set_final_floors
 from ...response.settling import slip_period
-from ...structure.drive_sizes import find_decay_rate, is_periodic
 from .. import refine
+from ..bench import bench
 from ..patch import faces
 from ..results.interfaces import check_pieces_overlap
 from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, Settings
-from . import bond_lists, decays, event_to_event, flutter, march
+from . import bond_lists, comparisons, decays, event_to_event, flutter, march, slides
 from . import fields as interface_fields
 from .engines import (
+    BENCH,
     ENGINES,
     HYBRID,
     MARCH,
@@ -44,13 +44,13 @@ from .engines import (
     MIN_RELATIVE_STEP_ERROR,
     Numerics,
     choose_numerics,
-    list_runs_with_other_modes,
 )
 from .evaluation import (
     Solution,
     add_level_errors,
     compute_peak_frequency,
     convert_to_scene_units,
+    first_interface_load,
     measure_onset_level,
     replace_output_by_gauge,
 )
@@ -75,6 +75,8 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
         Callbacks for a line of text and for the completed fraction.
     """
     # Only the module of this engine is loaded.
+    if numerics.engine == "bench":
+        return slides.solve_slide(model, numerics, patch, frames, say, progress)
     if numerics.engine == "hybrid":
         run = event_to_event.run_from_event_to_event
     elif numerics.engine == "march":
@@ -89,8 +91,16 @@ class Runner:
 
     Parameters
     ----------
-    inputs : RunInputs
-        Plan, Patch with its coarser mesh, and callbacks of the run.
+    model : Model
+        Model of the motion.
+    patches : sequence of Patch or None
+        Patch of [contact] on its meshes, from fine to coarse.
+    stiffer : joint.FreeRig, optional
+        Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
+    progress : callable, optional
+        Callback for the completed fraction of all runs.
+    is_single : bool
+        Whether a single run takes all the time.
 
     Attributes
     ----------
@@ -98,21 +108,23 @@ class Runner:
         Solution of each coarse run by its Numerics.
     """
 
-    def __init__(self, inputs: RunInputs):
-        self.inputs = inputs
-        self.model = inputs.plan.model
+    def __init__(self, model, patches, stiffer=None, progress=None, *, is_single: bool = False):
+        self.model = model
+        self.patches = patches
+        self.stiffer = stiffer
+        self.progress = progress
+        self.is_single = is_single
         self.solutions: dict[Numerics, Solution] = {}
         self._done = 0.0  # reported fraction of all runs
 
-    def solve(self, numerics: Numerics) -> Solution:
+    def solve(self, numerics: Numerics, say=None) -> Solution:
         """Solve the rig on its finest meshes, and store the frames of the interface that its result shows."""
-        has_fields = self.inputs.patch is not None or self.model.rig.friction.has_partial_slip
+        rig = self.model.rig
+        has_fields = self.patches[0] is not None or (
+            rig is not None and rig.friction.has_partial_slip
+        )
         return self._solve(
-            self.model,
-            numerics,
-            self.inputs.patch,
-            N_INTERFACE_FRAMES * has_fields,
-            self.inputs.say,
+            self.model, numerics, self.patches[0], N_INTERFACE_FRAMES * has_fields, say
         )
 
     def _solve_coarse_run(self, numerics: Numerics) -> Solution:
@@ -121,14 +133,14 @@ class Runner:
         The settings say what is coarser: the mesh, the modes of a reduced structure, or a joint whose stiffness differs.
         """
         model = self.model
-        patch = self.inputs.patches[numerics.coarse_patch]
+        patch = self.patches[numerics.coarse_patch]
         if numerics.other_rig is not None:
             model = replace(model, rig=model.rig.structure.other_rigs[numerics.other_rig])
         if numerics.stiffer_joint:
-            stiffer, (patch, *_) = self.inputs.stiffer[:2]
+            stiffer, (patch, *_) = self.stiffer[:2]
             model = replace(stiffer, rig=replace(stiffer.rig, drive=model.rig.drive))
         # The decay curve needs histories from the start of the run.
-        needs_whole = model.rig.drive.kind == "free"
+        needs_whole = model.rig is not None and model.rig.drive.kind == "free"
         return self._solve(model, replace(numerics, whole=needs_whole), patch)
 
     def _solve(self, model, numerics: Numerics, patch, frames: int = 0, say=None) -> Solution:
@@ -149,12 +161,12 @@ class Runner:
         """
         # Each run is a half of what is left, because the number of coarse runs is not known.
         left = 1 - self._done
-        share = left / 2 if self.inputs.estimate else left
+        share = left if self.is_single else left / 2
 
         def report(fraction: float) -> None:
             """Report the completed fraction of all runs, given that of the present run."""
-            if self.inputs.progress is not None:
-                self.inputs.progress(1 - left + share * fraction)
+            if self.progress is not None:
+                self.progress(1 - left + share * fraction)
 
         solution = solve_rig(model, numerics, patch, frames, say, report)
         self._done += share
@@ -220,14 +232,45 @@ class CoupledRun:
         return self.model.friction is not None
 
     @property
+    def settings(self) -> Settings:
+        """Numerical settings that the run used, which its result states."""
+        solution = self.solution
+        numerics = self.numerics
+        settings = solution.settings
+        if self.model.rig is not None:
+            settings = settings._replace(engine=numerics.engine, window_cycles=numerics.window)
+            if solution.bond_summation is not None:
+                settings = settings._replace(quadrature=solution.bond_summation.engine)
+        if ENGINES[numerics.engine].has_steps:
+            settings = settings._replace(steps_per_cycle=numerics.steps)
+
+        # A patch that slips part by part is a set of elements, or of shear modes if its load varies.
+        reduced = getattr(solution.contact, "reduction", None)
+        if reduced is None:
+            return settings
+        size = int(np.size(reduced.stiffness))
+        if hasattr(reduced, "yield_displacement"):
+            return settings._replace(elements=size)
+        return settings._replace(shear_modes=size)
+
+    def find_force_ratio(self) -> float:
+        """Return the largest ratio of friction force to mu_s N [1]; 0 under a load that varies."""
+        rig = self.model.rig
+        varies = self.model.load_varies if rig is None else rig.friction.load_varies
+        limit = 0.0
+        if self.has_friction and not varies:
+            limit = self.model.friction.static * first_interface_load(self.model, self.patch)
+        return float(np.abs(self.solution.response.force).max()) / limit if limit > 0 else 0.0
+
+    @property
     def has_errors(self) -> bool:
         """Whether errors are estimated: the caller wants them, the motion was found, and all meshes for them exist."""
         is_solved = self.solution.outcome is not Outcome.NOT_CONVERGED
         return self.inputs.estimate and is_solved and self.inputs.has_error_meshes
 
 
-def run_rig(inputs: RunInputs) -> Result:
-    """Compute the motion of a rig and return its Result.
+def run_motion(inputs: RunInputs) -> Result:
+    """Compute the motion of a rig, or the friction of a bench along its prescribed slide, and return its Result.
 
     Parameters
     ----------
@@ -241,6 +284,15 @@ def run_rig(inputs: RunInputs) -> Result:
     PatchfemError
         If the drive excites no mode.
     """
+    if inputs.plan.model.rig is not None:
+        return _run_rig(inputs)
+    run, _ = run_refined(inputs, choose_numerics(inputs.plan.model))
+    measures = run.measures if run.has_errors else remove_errors(run.measures)
+    return _make_result(replace(run, outcome=Outcome.DONE, measures=measures))
+
+
+def _run_rig(inputs: RunInputs) -> Result:
+    """Compute the motion of a rig and return its Result."""
     model = inputs.plan.model
     rig = model.rig
     if rig.start is None and rig.drive.kind != "free" and not np.any(rig.modes.base):
@@ -250,6 +302,8 @@ def run_rig(inputs: RunInputs) -> Result:
         )
 
     numerics = choose_numerics(model)
+    if not inputs.plan.draws_curve and ENGINES[numerics.engine].finds_periodic_motion:
+        numerics = replace(numerics, whole=False)
     if numerics.engine == "march":
         bond_lists.refuse_unresolved_bond_vibration(model, numerics)
     try:
@@ -271,7 +325,7 @@ def run_rig(inputs: RunInputs) -> Result:
     run = complete_measures(run)
     if rig.drive.kind == "free" and run.has_errors:
         run = _add_decay_curve(run)
-    if run.has_friction and find_decay_rate(rig.modes) < 0:
+    if run.has_friction and structure.drive_sizes.find_decay_rate(rig.modes) < 0:
         measures, notes = flutter.compute_flutter_amplitude(run)
         run = replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
     return replace(_make_result(run), shortage=shortage)
@@ -284,18 +338,19 @@ def _make_result(run: CoupledRun) -> Result:
     solution = run.solution
 
     # Warnings and notes see the measures before their floors are raised to the tolerance.
-    settings = _collect_settings(run)
-    warnings, notes = collect_remarks(run, settings)
+    warnings, notes = collect_remarks(run)
     notes = [*inputs.notes, *notes, *run.notes]
     measures = set_final_floors(run.measures, model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
         measures = reasons.find_missing_unbounded(measures)
-    if model.rig.drive.waveform.is_random:
+    if model.rig is not None and model.rig.drive.waveform.is_random:
         notes += stationary.warn_if_short(measures, solution.window)
 
     # The fields of [contact], and those of the patches of [[structure.interface]].
     fields = {}
-    if inputs.patch is not None:
+    if inputs.patch is not None and model.rig is None:
+        fields = slides.collect_slide_frames(model, inputs.patch, solution.response)
+    elif inputs.patch is not None:
         fields = interface_fields.collect_interface_fields(
             model, run.numerics, inputs.patch, solution
         )
@@ -318,11 +373,37 @@ def _make_result(run: CoupledRun) -> Result:
         patch=inputs.patch,
         fields=fields,
         response=solution.response,
-        window=solution.window,
-        settings=settings,
+        window=solution.response if model.rig is None else solution.window,
+        settings=run.settings,
         motion=_collect_motion(run),
         faces=moved,
     )
+
+
+def estimate_slide_errors(model, patches, run: "bench.BenchRun", steps: int) -> list[SourceErrors]:
+    """Estimate the errors of a run along a prescribed slide from coarser runs.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the run.
+    patches : list of Patch
+        Patches on nested meshes, from fine to coarse; [None] without a patch.
+    run : BenchRun
+        Run whose errors are estimated.
+    steps : int
+        Number of steps per cycle of this run.
+
+    Returns
+    -------
+    list of (str, dict)
+        Source of the error, and errors by measure.
+    """
+    solution = slides.make_slide_solution(run)
+    numerics = Numerics(BENCH.name, steps, model.slide.cycles, 1, None, run.engine.choice)
+    runs = comparisons.list_time_runs(model, numerics)
+    runs += comparisons.list_space_runs(model, numerics, patches[0], len(patches) - 1, solution)
+    return Runner(model, patches).estimate_errors(runs, solution)
 
 
 def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[CoupledRun]:
@@ -345,27 +426,27 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         Numerical settings of the first run.
     """
     model = inputs.plan.model
-    engine = ENGINES[numerics.engine]
-    size = model.rig.displacement_scale
-    runner = Runner(inputs)
-    first = runner.solve(numerics)
-    inputs.seconds.update({"march": first.seconds} | (first.prepare or {}))
+    rig = model.rig
+    size = np.inf if rig is None else rig.displacement_scale
+    stage = "bench" if rig is None else "march"
+    runner = Runner(
+        model, inputs.patches, inputs.stiffer, inputs.progress, is_single=not inputs.estimate
+    )
+    first = runner.solve(numerics, inputs.say)
+    inputs.seconds.update({stage: first.seconds} | (first.prepare or {}))
 
     # On a belt, the window must contain a complete stick-slip period, which the first run shows.
-    n_cycles = _count_slip_period_cycles(model, numerics, first)
+    n_cycles = 0 if rig is None else _count_slip_period_cycles(model, numerics, first)
     if n_cycles > numerics.window:
         numerics = replace(numerics, window=n_cycles)
-        first = runner.solve(numerics)
+        first = runner.solve(numerics, inputs.say)
     if not inputs.estimate or first.outcome is Outcome.NOT_CONVERGED:
         measures = add_errors(first.values, size=size) | compute_peak_frequency(first)
         return refine.Refined(CoupledRun(inputs, numerics, first, measures))
 
     # Comparison runs on coarser meshes, with other modes and with other joints; more steps do not repeat them.
-    space_runs = [
-        *engine.list_space_runs(model, numerics, inputs.patch, inputs.n_coarse, first),
-        *list_runs_with_other_modes(model, numerics),
-    ]
-    space_runs += _list_joint_runs(inputs, space_runs)
+    space_runs = comparisons.list_space_runs(model, numerics, inputs.patch, inputs.n_coarse, first)
+    space_runs += comparisons.list_joint_runs(inputs, space_runs)
     space_errors = runner.estimate_errors(space_runs, first)
 
     def solve(numerics: Numerics, coarser: CoupledRun | None) -> CoupledRun:
@@ -377,15 +458,15 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         if coarser is not None:
             # This run has twice the steps of the one before, with which it is compared.
             runner.solutions[coarser.numerics] = coarser.solution
-            solution = runner.solve(numerics)
-            inputs.seconds["march"] = solution.seconds
-        time_runs = engine.list_time_runs(model, numerics)
+            solution = runner.solve(numerics, inputs.say)
+            inputs.seconds[stage] = solution.seconds
+        time_runs = comparisons.list_time_runs(model, numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
         step_runs = list_step_runs(numerics.steps, solution, time_runs, runner.solutions)
         measures = add_errors(
             solution.values, errors, min_relative_error=MIN_MOTION_RELATIVE_ERROR, size=size
         )
-        if solution.levels or model.rig.drive.kind == "free":
+        if solution.levels or (rig is not None and rig.drive.kind == "free"):
             coarser_runs = [*time_runs, *space_runs]
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
         return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
@@ -396,22 +477,6 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
     return refine.Refined(replace(run, measures=run.measures | peak), shortage)
 
 
-def _list_joint_runs(inputs: RunInputs, space_runs: ComparisonRuns) -> ComparisonRuns:
-    """List the comparison run with a stiffer joint, if a joint was subtracted from the modes.
-
-    Its stiffness is larger by the error of the stiffness that was subtracted, so that the change of a
-    measure is its error. The run has the steps of the run on a coarser mesh.
-    """
-    if inputs.stiffer is None:
-        return []
-    joint_runs = []
-    for kind in space_runs:
-        if kind.runs and kind.runs[0].coarse_patch:
-            stiffer = replace(kind.runs[0], coarse_patch=0, stiffer_joint=True)
-            joint_runs.append(CoarserRuns((stiffer,), absolute_change, kind.reference, "mesh"))
-    return joint_runs
-
-
 def _count_slip_period_cycles(model, numerics, solution) -> int:
     """Return how many cycles the stick-slip motion on a belt takes to repeat; 0 if it does not.
 
@@ -420,7 +485,7 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
     drive and the friction law, `numerics` the cycles of the run, and `solution` is its motion.
     """
     drive = model.rig.drive.signal
-    if model.friction is None or not drive.segments or is_periodic(drive):
+    if model.friction is None or not drive.segments or structure.drive_sizes.is_periodic(drive):
         return 0
     response = solution.response
     n_cycles = ceil(slip_period(response.time, response.slide_rate) / drive.period)
@@ -474,6 +539,8 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
 def _count_finer_passes(run: CoupledRun) -> int:
     """Return how many times a run can be repeated with smaller steps than before."""
     numerics = run.numerics
+    if run.model.rig is None:
+        return 0  # those of a prescribed slide are refined together with the meshes (`refine.judge_pass`)
     if numerics.local:
         return ceil(log(numerics.local / MIN_RELATIVE_STEP_ERROR, 100) - 1e-9)
     if (
@@ -532,7 +599,7 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
     outcome, steady = judge_outcome(
         solution,
         measures,
-        (model.accuracy.tolerance, find_decay_rate(rig.modes)),
+        (model.accuracy.tolerance, structure.drive_sizes.find_decay_rate(rig.modes)),
         run.drive,
         rig.drive.levels.cycles,
         repeat,
@@ -540,7 +607,10 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
 
     # Without a stop in the scene, the motion has not hit anything: it exceeded the limit of the
     # program.
-    if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_COMPUTED_DISPLACEMENT:
+    if (
+        outcome is Outcome.EXCEEDS_TRAVEL
+        and rig.springs.travel == model_rig.MAX_COMPUTED_DISPLACEMENT
+    ):
         outcome = Outcome.GROWS
     # A growing motion has no final values, so the errors of its measures are unknown.
     if outcome is Outcome.GROWS and solution.outcome is not Outcome.GROWS:
@@ -583,7 +653,7 @@ def _add_decay_curve(run: CoupledRun) -> CoupledRun:
     )
     if not mesh_errors.reason:
         return replace(run, decay=decay)
-    coarser = ENGINES[run.numerics.engine].list_space_runs(
+    coarser = comparisons.list_space_runs(
         model, run.numerics, run.patch, run.inputs.n_coarse, solution
     )
     note = decays.describe_unknown_mesh_error(mesh_errors.reason, coarser)
@@ -599,29 +669,11 @@ def _find_final_outcome(run: CoupledRun) -> Outcome:
     return outcome
 
 
-def _collect_settings(run: CoupledRun) -> Settings:
-    """Return the numerical settings that a run used, which its result states."""
-    solution = run.solution
-    numerics = run.numerics
-    settings = solution.settings._replace(engine=numerics.engine, window_cycles=numerics.window)
-    if ENGINES[numerics.engine].has_steps:
-        settings = settings._replace(steps_per_cycle=numerics.steps)
-    if solution.bond_summation is not None:
-        settings = settings._replace(quadrature=solution.bond_summation.engine)
-
-    # A patch that slips part by part is a set of elements, or of shear modes if its load varies.
-    reduced = getattr(solution.contact, "reduction", None)
-    if reduced is None:
-        return settings
-    size = int(np.size(reduced.stiffness))
-    if hasattr(reduced, "yield_displacement"):
-        return settings._replace(elements=size)
-    return settings._replace(shear_modes=size)
-
-
 def _collect_motion(run: CoupledRun) -> MotionData:
     """Return what the Result states of a motion beside measures and histories, as MotionData."""
     solution = run.solution
+    if run.model.rig is None:
+        return MotionData(step_runs=run.step_runs)
     drive = run.model.rig.drive
     spectra = None
     if drive.waveform.is_random:

@@ -350,7 +350,8 @@ def _measure_point_volume(model, result, *, with_errors: bool = True) -> Measure
         Whether to estimate the error.
     """
     motion = {name: measure.value for name, measure in result.measures.items()}
-    path, path_error = compute_point_slip_path(model, result.window, motion)
+    window = result.window.last_cycle if model.rig is None else result.window
+    path, path_error = compute_point_slip_path(model, window, motion)
     volume = model.wear.coefficient * model.point.load * path * model.wear.cycles
     error = None
     if with_errors:

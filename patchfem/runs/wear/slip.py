@@ -13,13 +13,11 @@ import numpy as np
 from ...core import Measure, Outcome
 from ...response.outcome import judge_outcome
 from ...response.rows import AMPLITUDE
-from ..bench import bench
-from ..bench.engine import steps_per_cycle
 from ..bench.slides import integrate_steps
 from ..results.interfaces import check_pieces_overlap
 from ..results.patch_rows import Values
 from ..results.result import UNBOUNDED_OUTCOMES
-from ..rig import bands, engines, fields, rig
+from ..rig import bands, engines, fields, rig, slides
 
 MIN_CYCLE_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
@@ -61,23 +59,6 @@ class _Cycle(NamedTuple):
     normal: np.ndarray
     reference: np.ndarray
     is_closed: bool = False
-
-
-class _Motion(NamedTuple):
-    """Motion of a bench or a rig.
-
-    - window: histories of its last cycles.
-    - slide (k,): relative displacement [m] during the whole run.
-    - values: measures by name.
-    - nodes: _Cycle of the nodes, or None if no frames were asked for.
-    - outcome: outcome of a motion without periodic cycle, else None.
-    """
-
-    window: object
-    slide: np.ndarray
-    values: Values
-    nodes: _Cycle | None
-    outcome: Outcome | None = None
 
 
 class _PointSlip(NamedTuple):
@@ -166,22 +147,28 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     frames : int
         Number of frames per cycle from which the path is computed, if the nodes do not slip alike.
     """
-    follow = _follow_slide if model.rig is None else _follow_rig
-    motion = follow(model, patch, 0 if slips_uniformly(model) else frames)
-    cycle = _select_last_cycle(model, motion.window, patch.pressure.load)
+    n_frames = 0 if slips_uniformly(model) else frames
+    if model.rig is None:
+        n_frames *= max(1, round(model.slide.cycles or 1))
+    settings = engines.choose_numerics(model)
+    solution = rig.solve_rig(model, settings, patch, n_frames)
+    cycle = _select_last_cycle(model, solution.window, patch.pressure.load)
 
     # The slip follows from the histories if it is uniform, else from the frames of the cycle.
-    if motion.nodes is not None:
-        path, error = _integrate_node_slip(model, patch, motion.nodes)
+    if n_frames:
+        nodes = _collect_nodes(model, settings, patch, solution)
+        path, error = _integrate_node_slip(model, patch, nodes)
     elif bands_slide_independently(model):
-        path, error = _integrate_band_slip(model, patch, motion.window, cycle)
+        path, error = _integrate_band_slip(model, patch, solution.window, cycle)
     else:
         path, error = _integrate_uniform_slip(model, cycle)
         path = np.full(patch.pieces.interface.weight.shape, path)
+    outcome = None
     if model.rig is not None:
-        error += _slip_amplitude_change(motion.values, cycle)
-    outcome = check_pieces_overlap(motion.outcome, model.patch, patch, motion.slide)
-    return CycleSlip(path, error, motion.values, outcome)
+        error += _slip_amplitude_change(solution.values, cycle)
+        outcome = _find_unbounded_outcome(model, solution)
+    outcome = check_pieces_overlap(outcome, model.patch, patch, solution.response.slide)
+    return CycleSlip(path, error, solution.values, outcome)
 
 
 def compute_point_slip_path(model, window, values: Values) -> tuple[float, float]:
@@ -205,46 +192,8 @@ def compute_point_slip_path(model, window, values: Values) -> tuple[float, float
     return path / _count_path_cycles(model, window), error
 
 
-def _follow_slide(model, patch, frames: int) -> _Motion:
-    """Compute the motion of a bench, with the slip and the tractions of its nodes in the last cycle.
-
-    `model` and `patch` are those at the present worn depth, and `frames` is the number of frames in each cycle; with 0
-    the nodes are None.
-    """
-    cycles = max(1, round(model.slide.cycles or 1))
-    run = bench.run_bench(model, patch, steps_per_cycle(model), frames * cycles)
-    if not frames:
-        return _Motion(run, run.slide, run.values, None)
-    is_last = run.frames >= run.first
-    slide = run.slide[run.frames[is_last]]
-    local = run.local[is_last]
-    tau = run.tau[is_last]
-
-    # A path that is not cyclic begins at rest, before its first frame. The load then rests on the flank of a groove.
-    if run.first == 0:
-        slide = np.append(0.0, slide)
-        local = np.pad(local, ((1, 0), (0, 0)))
-        tau = np.pad(tau, ((1, 0), (0, 0)))
-        if model.grooves is not None:
-            tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
-
-    sigma = patch.pressure.sigma_n
-    normal = np.repeat(sigma[None], slide.size, axis=0)
-    nodes = _Cycle(slide, local, tau, normal, sigma)
-    return _Motion(run, run.slide, run.values, nodes)
-
-
-def _follow_rig(model, patch, frames: int) -> _Motion:
-    """Compute the motion of a rig, with the slip and the tractions of its nodes in the last cycle.
-
-    `model` and `patch` are those at the present worn depth, and `frames` is the number of frames in the last cycle; with
-    0 the nodes are None. The outcome is None unless the motion has no bound.
-    """
-    settings = engines.choose_numerics(model)
-    solution = rig.solve_rig(model, settings, patch, frames)
-    response = solution.response
-
-    # A motion without bound has no slip path (the caller stops the wear).
+def _find_unbounded_outcome(model, solution) -> Outcome | None:
+    """Return the outcome of a motion of a rig without bound, which has no slip path; None for any other motion."""
     amplitude = Measure(solution.values[AMPLITUDE], "m", 0.0)
     outcome, _ = judge_outcome(
         solution,
@@ -253,26 +202,51 @@ def _follow_rig(model, patch, frames: int) -> _Motion:
         model.rig.drive.signal,
         repeat=model.rig.count_repeat_cycles(model.point),
     )
-    nodes = None
-    if frames:
-        frame_fields = fields.collect_interface_fields(model, settings, patch, solution)
-        in_cycle = {name: values[1:] for name, values in frame_fields.items()}
-        # Over grooves the load varies with the lift, and each node carries its part of it.
-        load = patch.pressure.load
-        loads = np.full(response.time.size, load)
+    return outcome if outcome in UNBOUNDED_OUTCOMES else None
+
+
+def _collect_nodes(model, settings, patch, solution) -> _Cycle:
+    """Return the slip and the tractions of the nodes in the frames of the last cycle.
+
+    Parameters
+    ----------
+    model : Model
+        Model at the present worn depth.
+    settings : Numerics
+        Settings of the motion.
+    patch : Patch
+        Patch at the present worn depth.
+    solution : Solution
+        Motion with its frames.
+    """
+    response = solution.response
+    sigma = patch.pressure.sigma_n
+    is_rig = model.rig is not None
+    if is_rig:
+        frames = fields.collect_interface_fields(model, settings, patch, solution)
+        in_cycle = np.arange(frames["time"].size) > 0
+    else:
+        frames = slides.collect_slide_frames(model, patch, response)
+        # A path that is not cyclic begins at rest, before its first frame. The load then rests on the flank of a groove.
+        in_cycle = np.append(response.first == 0, response.frames >= response.first)
         if model.grooves is not None:
-            loads = response.extra.get("normal_load", loads)
-        sigma = patch.pressure.sigma_n
-        nodes = _Cycle(
-            slide=in_cycle["holder_slide"],
-            slip=in_cycle["slip"],
-            friction=in_cycle["shear_stress"],
-            normal=np.outer(np.interp(in_cycle["time"], response.time, loads) / load, sigma),
-            reference=sigma,
-            is_closed=True,
-        )
-    outcome = outcome if outcome in UNBOUNDED_OUTCOMES else None
-    return _Motion(solution.window, response.slide, solution.values, nodes, outcome)
+            frames["shear_stress"][0] = model.grooves.slope(0.0) * sigma
+    frames = {name: values[in_cycle] for name, values in frames.items()}
+
+    # Over the grooves of a rig the load varies with the lift, and each node carries its part of it.
+    shares = np.ones(frames["time"].size)
+    if is_rig and model.grooves is not None:
+        load = patch.pressure.load
+        loads = response.extra.get("normal_load", np.full(response.time.size, load))
+        shares = np.interp(frames["time"], response.time, loads) / load
+    return _Cycle(
+        slide=frames["holder_slide"],
+        slip=frames["slip"],
+        friction=frames["shear_stress"],
+        normal=np.outer(shares, sigma),
+        reference=sigma,
+        is_closed=is_rig,
+    )
 
 
 def _slip_amplitude_change(values: Values, cycle: _Cycle) -> float:
@@ -294,12 +268,8 @@ def _select_last_cycle(model, window, load: float) -> _Cycle:
     the window of a rig has the vertical force. Under a load that oscillates, the motion has as many cycles as the load
     and the drive need to repeat.
     """
-    if model.rig is None:
-        rows = slice(window.first, None)
-        loads = window.load
-    else:
-        rows = _is_in_last_cycle(model, window)
-        loads = window.extra.get("normal_load", np.full(window.time.size, load))
+    rows = slice(None) if model.rig is None else _is_in_last_cycle(model, window)
+    loads = window.extra.get("normal_load", np.full(window.time.size, load))
     slip, force, loads = (row[rows, None] for row in (window.slip, window.force, loads))
     return _Cycle(window.slide[rows], slip, force, loads, np.array([load]))
 

@@ -72,6 +72,7 @@ class MotionFeatures(NamedTuple):
             "load": self.load_change,
             "yaw": "with bands that yaw" if self.bands_yaw else "",
             "yaw-levels": "",
+            "yaw-parts": "",
             "parts": f"with {self.compliance}" if self.compliance else "",
             "grooves": f"with {self.grooves}" if self.grooves else "",
             "spring": f"with {self.spring}" if self.spring else "",
@@ -82,6 +83,8 @@ class MotionFeatures(NamedTuple):
         }
         if words["yaw"] and words["levels"]:
             words["yaw-levels"] = f"{words['yaw']} and waveform 'levels'"
+        if words["yaw"] and words["parts"]:
+            words["yaw-parts"] = f"{words['yaw']} {words['parts']}"
         return words
 
 
@@ -105,7 +108,7 @@ ENGINE_SUPPORT = {
     "exact": EngineSupport("exact", "no-law yaw faces"),
     "piecewise": EngineSupport("pieces", "parts faces"),
     "march": EngineSupport(
-        "march", "no-law load yaw yaw-levels parts grooves spring faces levels pressed"
+        "march", "no-law load yaw yaw-levels yaw-parts parts grooves spring faces levels pressed"
     ),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces"),
 }

@@ -20,8 +20,6 @@ from ...effects import (
     describe_unsupported,
     find_waveform,
     law_has_trait,
-    law_supports,
-    law_takes_stiffness_or_length,
 )
 from ..keys.contact import Contact
 from ..keys.tables import Friction
@@ -129,6 +127,20 @@ class Joint(TableFacts):
         return bool(is_unbounded and self.initial_bonds)
 
     @property
+    def load_change_or_grooves(self) -> str:
+        """Text of what changes the load on the points of the interface on their way; "" if nothing does."""
+        grooves = "" if self.is_interface else self.grooves
+        return grooves or (self.load_change and self.kind == "rig" and self.load_change_description)
+
+    @property
+    def unplaced_motion(self) -> str:
+        """Key of a mode that turns or lifts a joint which has no places that move differently; "" if none does."""
+        if self.kind != "rig" or self.contact.area:
+            return ""
+        is_point = not (self.is_interface or self.contact)
+        return self.yaw or (self.heave_key if is_point else "")
+
+    @property
     def variable_stiffness_key(self) -> str:
         """Key of what leaves the joint of measured modes without a single stiffness in stick; "" if it has one."""
         written = [key for key in VARIABLE_STIFFNESS_KEYS if self.find_key_value(key)]
@@ -172,11 +184,6 @@ JOINT_FEATURES = {
     # kinds of scenes and drives
     "rig": Feature(lambda j: j.kind == "rig"),
     "load on a point": Feature(lambda j: j.scene.normal),
-    "single contact point": Feature(
-        lambda j: j.kind == "rig" and not j.is_interface and not j.contact,
-        "",
-        "a single contact point",
-    ),
     "drive other than a sine": Feature(
         lambda j: j.scene.drive.kind == "free" or (j.wave.name and not j.wave.is_sine),
         "drive.waveform",
@@ -189,22 +196,20 @@ JOINT_FEATURES = {
     ),
     # the load
     "mode with heave or pitch": Feature(lambda j: j.heave_key, "{heave_key}"),
+    "mode that turns or lifts a joint without places": Feature(
+        lambda j: j.unplaced_motion, "{unplaced_motion}", "a joint without places"
+    ),
+    "changing load or grooves": Feature(
+        lambda j: j.load_change_or_grooves, "", "{load_change_or_grooves}"
+    ),
     "changing load": Feature(
         lambda j: j.kind == "rig" and j.load_change, "{load_change}", "{load_change_description}"
     ),
     # the law
-    "memory of the slip": Feature(
-        lambda j: not j.has_trait("memoryless") or j.compliance,
-        "",
-        "a friction force that depends on earlier slip",
-    ),
     "kinetic below static": Feature(
         lambda j: j.has_trait("set-valued") and -1 < j.kinetic < j.static,
         "{table_key}.kinetic",
         "{kinetic:g} below static = {static:g}",
-    ),
-    "bonds of a given stiffness": Feature(
-        lambda j: j.stiffness and law_takes_stiffness_or_length(j.law), "{table_key}.stiffness"
     ),
     "bonds that no force can move": Feature(
         lambda j: j.has_unbounded_bonds,
@@ -221,21 +226,9 @@ JOINT_FEATURES = {
     "shape on the lower piece": Feature(
         lambda j: j.lower_shape, "{lower_shape}", "a shape on the lower piece"
     ),
-    "patch without a face": Feature(
-        lambda j: not (j.contact and j.contact.area), "", "a joint without [contact.area]"
-    ),
     "shapes on different pieces": Feature(
         lambda j: j.opposite_shape, "{opposite_shape}", "a shape on each piece"
     ),
-    "bands that slip together": Feature(
-        lambda j: (
-            j.law in LAWS
-            and not (law_supports(j.table, "pieces") and law_supports(j.table, "shear"))
-        ),
-        "",
-        "law '{law}'",
-    ),
-    "mode with yaw": Feature(lambda j: j.yaw, "{yaw}"),
     "grooves": Feature(lambda j: not j.is_interface and j.grooves, "contact.grooves", "{grooves}"),
     # interfaces
     "interface": Feature(lambda j: j.is_interface, "{table_key}", "[[structure.interface]]"),

@@ -120,7 +120,8 @@ def test_always_interval_contains_the_extreme():
         if one is not None and one.is_largest:
             n_found += 1
             n_held += one.interval[0] <= to_key(top) <= one.interval[1]
-            assert one.band[0] <= one.interval[1] and one.band[1] >= one.interval[0]
+            if one.band is not None:
+                assert one.band[0] <= one.place <= one.band[1]
     assert n_found > 300 and n_held >= 0.95 * n_found
 
 
@@ -130,6 +131,18 @@ def test_always_interval_contains_the_extreme():
 def test_exact_monotonic_measures_have_no_extreme(y):
     """A measure that rises or falls within its errors, or has fewer than three values, has no extreme."""
     assert find_extremes(np.arange(1.0, len(y) + 1), np.array(y, float), errors=1e-6) == {}
+
+
+def test_exact_minimum_between_distant_cases_has_no_value_but_its_neighbours():
+    """A parabola through amplitudes of 2.36, .147 and .275 mm has a negative minimum, which no amplitude has."""
+    loads = np.geomspace(10.0, 1e4, 9)
+    amplitudes = np.array([4.95, 4.66, 3.98, 2.36, 0.147, 0.275, 0.627, 1.39, 3.28])
+    table = make_table({"normal.load": loads}, {"relative_displacement_amplitude": amplitudes})
+    (one,) = analyse(table).extremes
+    assert (one.value, one.place, one.band) == (0.147, pytest.approx(loads[4]), None)
+    assert one.interval == pytest.approx((loads[3], loads[5]))
+    words = "(the smallest lies between 133.4 and 749.9, where more cases are needed)"
+    assert words in make_verdict(table, analyse(table))[0]
 
 
 def test_exact_first_sentence_names_each_main_measure():

@@ -6,7 +6,7 @@ from command_line import read_page
 from comparisons import compare_traces
 
 from patchfem.export import page, store
-from patchfem.export.surfaces import compare, pairs
+from patchfem.export.surfaces import compare
 
 DEPTHS = (0.5e-6, 0.7e-6, 0.75e-6)
 
@@ -26,7 +26,7 @@ def make_rows() -> list[dict]:
 
 def test_exact_files_of_pairs(tmp_path):
     """The headline counts the pairs; the table and the page have every pair, also one that failed."""
-    answer = pairs.make_answer(make_rows(), "pairs.csv")
+    answer = compare.make_pairs_answer(make_rows(), "pairs.csv")
     assert answer.verdict == ("5 pairs: 4 worn, 0 not, 1 failed.",)
 
     store.write_answer(answer, tmp_path)

@@ -13,7 +13,7 @@ from sweep_tables import assert_same_files, make_table, read_rows
 
 from patchfem.export import store
 from patchfem.export.folder import Folder
-from patchfem.export.sweeps import store as store_chunks
+from patchfem.export.sweeps import folder as store_chunks
 from patchfem.runs import CaseResults
 from patchfem.runs.batch import batches
 

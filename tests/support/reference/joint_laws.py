@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from patchfem.scene import KNOWLEDGE_OF_JOINT, WISHES_FOR_LAW
 from patchfem.scene.joint_laws import JOINT_LAWS
 
 from .keys import FOLDER, format_table
@@ -17,14 +16,7 @@ def text() -> str:
     """Return the page of the guide with its table of joint laws generated again."""
     before, _, rest = FILE.read_text("utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
-    words = f"{_format_definitions('know', KNOWLEDGE_OF_JOINT)}\n{_format_definitions('want', WISHES_FOR_LAW)}"
-    return f"{before}{BEGIN}{words}\n\n{format_table(HEAD, _list_rows())}\n\n{END}{after}"
-
-
-def _format_definitions(question: str, meanings: dict) -> str:
-    """Return a list item with the meaning of every answer to a question."""
-    answers = "; ".join(f"`{word}`: {meaning}" for word, meaning in meanings.items())
-    return f"- What you {question}: {answers}."
+    return f"{before}{BEGIN}{format_table(HEAD, _list_rows())}\n\n{END}{after}"
 
 
 def _format_code(words: tuple) -> str:

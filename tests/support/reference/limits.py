@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-from patchfem.effects import LAWS, join_words
+from patchfem.effects import join_words
 from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_REPORTED_NORMAL_COUPLING_RATIO
 from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
 from patchfem.scene.rules import support
@@ -54,8 +54,8 @@ LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
 patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected.
 With `[contact.area]` the pieces are blocks in three dimensions. Their friction acts along x alone: slip across x and the
-coupling of pressure and shear stress of unequal pieces are neglected. If a mode yaws the face, bands of cells slide by
-themselves, and the shear between bands is neglected.
+coupling of pressure and shear stress of unequal pieces are neglected. If a mode yaws the face, each band of cells slides
+with the displacement of its middle.
 
 **Small strains, linear elasticity.** The pieces are isotropic; plasticity, creep and heat are neglected. The coating is
 bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {MAX_SMALL_STRAIN:g}.
@@ -117,7 +117,6 @@ infinite; any computed value of this peak would depend on the mesh.
 
 
 ADVICE = {  # Property of a joint in the advice of a row -> its meaning.
-    "{compliance}": "what lets the patch slip part by part",
     "{heave_key}": "the heave and the pitch of the modes",
 }
 SHAPES = [
@@ -125,13 +124,11 @@ SHAPES = [
     for header, table in iterate_tables()
     if "on" in table.model_fields
 ]
-ELEMENT_LAWS = [
-    name for name, law in LAWS.items() if {"pieces", "shear"} <= {*law.supports.split()}
-]
 MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its keys.
     "rig": "`[drive]` with `[friction]` or `[[structure.interface]]`",
     "load on a point": "`[normal]`",
-    "single contact point": "in a rig: `[normal]`",
+    "mode that turns or lifts a joint without places": "a mode with yaw and no `[contact.area]`, or a mode with heave or "
+    "pitch and `[normal]`",
     "drive other than a sine": "`drive.kind` is `free`, or `drive.waveform` is not `sine`",
     "sensor apart from the output": "`accelerometer` or `gauge` of a `[[structure.mode]]` differs from its `output`",
     "output that bounds the motion": "`structure.travel`, `structure.stiffening`, `drive.kind` is `free`, or "
@@ -141,17 +138,13 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "nonlinear asperities": "`patch.asperities.law` is `exponential` or `hertz`",
     "mode with heave or pitch": "`normal` or `pitch` of a `[[structure.mode]]` is not 0, or `structure.normal_at` or "
     "`structure.pitch_at` is given",
+    "changing load or grooves": "a changing load, or grooves",
     "changing load": "in a rig: `normal.amplitude`, or a mode with heave or pitch",
-    "mode with yaw": "`yaw` of a `[[structure.mode]]` is not 0",
-    "memory of the slip": "a law with stretch or bonds, or partial slip",
     "kinetic below static": "law that sticks rigidly, with `kinetic` less than `static`",
-    "bonds of a given stiffness": "`stiffness` of a law that takes `bond_length` in its place",
     "bonds that no force can move": "law nonlocal with reading 'report', -1 < `order` < 0 and `initial_bonds` > 0",
     "partial slip": "`[patch.shear]`, `patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`",
     "shape on the lower piece": "`on` is `lower` in " + join_words(SHAPES, "or"),
-    "patch without a face": "no `[contact.area]`",
     "shapes on different pieces": "`on` is `upper` in one and `lower` in another of " + join_words(SHAPES, "and"),
-    "bands that slip together": "another law than " + join_words(ELEMENT_LAWS, "or"),
     "grooves": "`[contact.grooves]` or `[normal.grooves]`, with `amplitude` > 0",
     "interface": "`[[structure.interface]]`",
 }  # fmt: skip

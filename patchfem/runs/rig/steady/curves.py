@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ....core import NotConverged, Response, SineDrive
 from ....formatting import format_quantity
@@ -256,6 +255,7 @@ MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a pea
 # Tolerance of the position of a peak, relative to its width: a part of the tolerance of the scene, at least round-off.
 POSITION_TOL = 0.1
 MIN_POSITION_TOL = 3e-4
+LARGEST_GAP = 1.5  # distance to the farther neighbour of a peak at which its refinement ends, relative to this tolerance
 WIDTH_HEIGHT_FRACTION = 0.9  # Fraction of the height of a peak at which its width is measured.
 # Ratio of the shift of a peak to its width times the relative error of its height. The width is
 # measured a tenth below the peak, so that an error of a tenth shifts it by its width.
@@ -339,29 +339,74 @@ class CurveInProgress:
         positions = np.array(self.positions)
         k = self.positions.index(place)
         width = min(
-            _measure_peak_width(heights[k:], positions[k:] - place),
-            _measure_peak_width(heights[k::-1], place - positions[k::-1]),
+            measure_peak_width(heights[k:], positions[k:] - place),
+            measure_peak_width(heights[k::-1], place - positions[k::-1]),
         ) or np.ptp(positions)
-        bounds = positions[max(k - 1, 0)], positions[min(k + 1, positions.size - 1)]
-        options = {"xatol": tolerance * width, "maxiter": MAX_ADDED_POINTS}
         try:
-            minimize_scalar(self._compute_depth, bounds=bounds, method="bounded", options=options)
+            brackets = [np.inf, np.inf]
+            for _ in range(MAX_ADDED_POINTS):
+                k = self.positions.index(place)
+                around = self.positions[max(k - 1, 0) : k + 2]
+                farther = max(around, key=lambda other: abs(other - place))
+                if abs(farther - place) <= LARGEST_GAP * tolerance * width:
+                    return
+
+                # Two steps that have not halved the bracket are followed by a bisection.
+                brackets.append(around[-1] - around[0])
+                added = (place + farther) / 2
+                if brackets[-1] <= 0.5 * brackets[-3]:
+                    added = self._choose_place(place, farther, tolerance * width)
+                self._add_point(added)
+                place = self._find_top(added)
         except NotConverged:
             # The points that have been added remain.
             return
 
-    def _compute_depth(self, position: float) -> float:
-        """Add the point at a position along the curve; return its negative amplitude [m], which Brent's method minimizes."""
+    def _find_top(self, place: float) -> float:
+        """Return the position of the highest of three neighbouring points, the middle of which is at `place`."""
+        k = self.positions.index(place)
+        around = range(max(k - 1, 0), min(k + 2, len(self.positions)))
+        heights = self.find_heights()
+        return self.positions[max(around, key=lambda number: heights[number])]
+
+    def _choose_place(self, place: float, farther: float, distance: float) -> float:
+        """Return the position of the vertex of a parabola through the inverse squares of three heights.
+
+        This parabola is exact for a linear resonance. Its vertex is moved to a distance from the highest point, towards the
+        farther neighbour, if it is nearer to a point.
+
+        Parameters
+        ----------
+        place, farther : float
+            Positions of the highest point, and of the neighbour that is farther away.
+        distance : float
+            Smallest distance from a point.
+        """
+        k = self.positions.index(place)
+        x = np.array(self.positions[max(k - 1, 0) : k + 2])
+        y = self.find_heights()[max(k - 1, 0) : k + 2]
+        if x.size < 3 or not (y > 0).all():
+            return (place + farther) / 2
+
+        # Divided differences (Newton); the middle inverse square is the lowest of three, so that a vertex lies between them
+        inverse = (y[1] / y) ** 2
+        slopes = np.diff(inverse) / np.diff(x)
+        vertex = 0.5 * (x[0] + x[1] - slopes[0] * (x[2] - x[0]) / (slopes[1] - slopes[0]))
+        if np.abs(x - vertex).min() > distance:
+            return float(vertex)
+        return place + float(np.copysign(min(distance, abs(farther - place) / 2), farther - place))
+
+    def _add_point(self, position: float) -> None:
+        """Compute the point at a position along the curve and add it."""
         k = min(max(bisect(self.positions, position), 1), len(self.points) - 1)
         begin, end = self.positions[k - 1 : k + 1]
         fraction = (position - begin) / (end - begin)
         point = self.finder.compute_point_between(self.points[k - 1], self.points[k], fraction)
         self.points.insert(k, point)
         self.positions.insert(k, position)
-        return -self.find_heights()[k]
 
 
-def _measure_peak_width(y, distances) -> float:
+def measure_peak_width(y, distances) -> float:
     """Return the distance from a peak at which the curve has fallen to WIDTH_HEIGHT_FRACTION of it.
 
     `distances` (k,) are the distances of the values y (k,) from the peak.
@@ -422,12 +467,11 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
         position_error = min(
             far,
             float(distances[1])
-            + ERROR_SHIFT_FACTOR * error / height * _measure_peak_width(heights, distances),
+            + ERROR_SHIFT_FACTOR * error / height * measure_peak_width(heights, distances),
         )
         max_position_error = max(max_position_error, position_error)
-        for name, difference in _compute_neighbour_differences(
-            finder, points[best + direction * number], solution
-        ).items():
+        neighbour = finder.compute_point_values(points[best + direction * number])
+        for name, difference in absolute_change(solution.values, neighbour).items():
             position_errors[name] = max(
                 position_errors[name], difference * position_error / far if far else difference
             )
@@ -435,15 +479,3 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     position_errors[AMPLITUDE] = min(above, solution.values[AMPLITUDE]) + missed
     errors = {name: error + position_errors.get(name, 0.0) for name, error in errors.items()}
     return replace(solution, errors=errors, peak_error=float(max_position_error))
-
-
-def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> Values:
-    """Return by how much each measure at a curve point differs from that at the peak; {} without a steady motion there.
-
-    `finder` computes the motion of the point `neighbour` from its drive and guess; `solution` is the motion at the peak.
-    """
-    try:
-        other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)
-    except NotConverged:
-        return {}
-    return absolute_change(solution.values, other.values)

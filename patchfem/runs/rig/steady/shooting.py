@@ -16,9 +16,10 @@ from ....core import NotConverged, Outcome, PatchfemError, SineDrive
 from ....formatting import format_length
 from ....hybrid import cases, periodic
 from ....hybrid.continuation import PathPoint, PathSettings
+from ....hybrid.harmonic_balance import BalancedMotions, balance_first_harmonic
 from ....hybrid.laws import is_rigid, masing
 from ....hybrid.periodic_curves import CurveStart, PeriodEquations, measure_distance
-from ....hybrid.records import Probe, Status, Window
+from ....hybrid.records import Probe, State, Status, Window
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ....response.spectrum import make_acceleration_measures
@@ -37,6 +38,7 @@ from .curves import (
     ResponseCurve,
     describe_instability,
     estimate_point_errors,
+    measure_peak_width,
     note_end_of_curve,
     sample_adaptively,
     solve_peak,
@@ -51,6 +53,15 @@ STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, rela
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 1  # cycles before the first correction of a motion that starts from a similar one
+# Height of a maximum of the first-harmonic balance that is examined, relative to the largest steady motion. On 300 random
+# dampers the balance exceeded it by up to a factor of 1.8, and fell short of it by 10 %.
+MIN_HEIGHT_RATIO = 0.5
+MAX_BRACKET_STEPS = (
+    8  # steps, each twice as long as the one before, beyond which no maximum is looked for
+)
+N_BALANCED_CYCLES = (
+    3  # cycles before the first correction of a motion that starts from the first-harmonic balance
+)
 # Relative distance from its friction limit at which an interface slips as a whole
 FULL_SLIP_TOL = 1e-9
 # Steps along a response curve over frequency
@@ -73,11 +84,15 @@ class ShootingFinder:
         self.numerics = replace(
             numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
         )
+        self.draws_curve = numerics.whole
         compiled.load_compiled_module("hybrid.engine_kernels", say)
         self.joints = make_joints(model, self.numerics, patch)
         self.may_fold = may_fold(model)
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
         laws = [law for law, _ in self.joints.laws]
+        self.odd_laws = ()
+        if all(law.law == "masing" for law in laws) and not model.rig.springs.is_nonlinear:
+            self.odd_laws = laws
         is_smooth = any(masing.has_power_law(law) for law in laws)
         is_smooth &= all(law.law == "masing" for law in laws)
         self.follows_curve = self.may_fold or (is_smooth and self._max_growth_rate < 0)
@@ -112,7 +127,11 @@ class ShootingFinder:
         # A damped motion whose stability does not matter follows from its guess in a few periods; any other is searched.
         case = self.make_case(drive)
         is_undamped = self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL
-        if guess is None or needs_stability or is_undamped:
+        if isinstance(guess, State):
+            motion = periodic.find_periodic_motion(
+                case, start=guess, n_first=N_BALANCED_CYCLES, odd_laws=self.odd_laws
+            )
+        elif guess is None or needs_stability or is_undamped:
             motion = periodic.find_periodic_motion(
                 case,
                 start=guess and guess.run.final,
@@ -121,7 +140,7 @@ class ShootingFinder:
                 is_undamped=is_undamped,
             )
         else:
-            motion = periodic.follow_periodic_motion(case, guess)
+            motion = periodic.follow_periodic_motion(case, guess, self.odd_laws)
         if motion.grows:
             return motion
 
@@ -191,6 +210,19 @@ class ShootingFinder:
             settings=Settings(map="shooting"),
             periodic=SteadyData(regime, motion.multipliers, motion.change),
         )
+
+    def compute_point_values(self, point: CurvePoint) -> Values:
+        """Return the measures of the motion of a curve point; {} without a steady motion there."""
+        motion = (
+            point.guess.equations.details if isinstance(point.guess, PathPoint) else point.guess
+        )
+        try:
+            if motion is None:
+                return self.compute_steady_motion(point.drive).values
+            run = self.evaluator.resume(point.drive, N_CYCLES, motion.run.final, 0)
+        except NotConverged:
+            return {}
+        return self.evaluator.make_solution(run, 0.0, point.drive).values
 
     def _find_stable_motion(self, drive, guess) -> tuple[periodic.PeriodicMotion, tuple[str, ...]]:
         """Return a periodic motion, and notes on others under the same drive.
@@ -439,6 +471,10 @@ class ShootingFinder:
         """
         if self.follows_curve:
             return self._follow_curve(drive)
+        if not self.draws_curve:
+            points = self._bracket_peaks(drive)
+            if points:
+                return ResponseCurve(points)
 
         def sample(frequency, before):
             """Return the amplitude [m] at a frequency [Hz], and the curve point.
@@ -452,6 +488,86 @@ class ShootingFinder:
         frequencies = choose_start_frequencies(self.modes, drive)
         samples = sample_adaptively(sample, frequencies, INTERPOLATION_TOL)
         return ResponseCurve([point for _, point in samples])
+
+    def _bracket_peaks(self, drive) -> list[CurvePoint]:
+        """Return points around each high maximum of a response curve, in order; [] if the peaks cannot be estimated.
+
+        The maxima of the first-harmonic balance are the guesses.
+
+        Parameters
+        ----------
+        drive : SweepDrive
+            Its amplitude and its range of frequencies.
+        """
+        laws = self.odd_laws
+        if not laws or self.joints.has_kinks or self._max_growth_rate >= 0:
+            return []
+        frequencies = np.sort(choose_start_frequencies(self.modes, drive))
+        omega = 2 * np.pi * frequencies
+        balanced = balance_first_harmonic(self.modes, laws, drive.acceleration, omega)
+        gauge = self.modes.output if self.modes.gauge is None else self.modes.gauge
+        heights = np.abs(balanced.modes @ gauge)
+
+        # The highest maxima come first, and end where none is high enough beside the motions that were found.
+        padded = np.pad(heights, 1)
+        maxima = np.flatnonzero((heights >= padded[:-2]) & (heights >= padded[2:]))
+        points: dict[float, CurvePoint] = {}
+        highest = 0.0
+        for k in maxima[np.argsort(-heights[maxima])]:
+            if heights[k] < MIN_HEIGHT_RATIO * highest:
+                break
+            try:
+                found = self._bracket_peak(drive, balanced, heights, k)
+            except NotConverged:
+                return []
+            if not found:
+                return []
+            points |= found
+            highest = max(point.values[AMPLITUDE] for point in points.values())
+        return [points[frequency] for frequency in sorted(points, reverse=drive.low > drive.high)]
+
+    def _bracket_peak(
+        self, drive, balanced: BalancedMotions, heights, k: int
+    ) -> dict[float, CurvePoint]:
+        """Return points of a curve by their frequencies [rad/s], around its maximum near an estimated one.
+
+        Parameters
+        ----------
+        drive : SweepDrive
+            Its amplitude and its range of frequencies.
+        balanced : BalancedMotions
+            First harmonics of the motions at rising frequencies.
+        heights : (k,) array
+            Their amplitudes [m].
+        k : int
+            Number of the first harmonic at the estimated maximum.
+        """
+        omega = balanced.omega
+        first = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
+        start = balanced.make_start(self.make_case(first), k)
+        points = {omega[k]: self.compute_curve_point(first, start, needs_stability=False)}
+
+        # Outwards from the estimate until the amplitude falls on both sides
+        widths = (
+            measure_peak_width(heights[k::-1], omega[k] - omega[k::-1]),
+            measure_peak_width(heights[k:], omega[k:] - omega[k]),
+        )
+        for width, end, direction in zip(widths, (omega[0], omega[-1]), (-1, 1)):
+            last = omega[k]
+            for step in width * 2.0 ** np.arange(MAX_BRACKET_STEPS):
+                if last == end:
+                    break
+                place = float(np.clip(last + direction * step, omega[0], omega[-1]))
+                sine = replace(first, omega=place)
+                points[place] = self.compute_curve_point(
+                    sine, points[last].guess, needs_stability=False
+                )
+                if points[place].values[AMPLITUDE] < points[last].values[AMPLITUDE]:
+                    break
+                last = place
+            else:
+                return {}
+        return points
 
     def _follow_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation along its arc length, through its folds."""
@@ -529,7 +645,11 @@ class ShootingFinder:
                 )
             return self._make_curve_point(point)
         omega = first.drive.omega + fraction * (second.drive.omega - first.drive.omega)
-        return self.compute_curve_point(replace(first.drive, omega=omega), first.guess)
+        sine = replace(first.drive, omega=omega)
+        guess = first.guess
+        if not self.draws_curve:
+            guess = periodic.interpolate_motions(first.guess, second.guess, fraction)
+        return self.compute_curve_point(sine, guess, needs_stability=self.draws_curve)
 
 
 def choose_start_frequencies(modes, drive) -> np.ndarray:
