@@ -1,8 +1,7 @@
 """Cases of a static patch as columns, and their solution: records with a leading case axis.
 
 In: a `PatchModel` in whose loading and gap shapes numbers may be arrays (n,). Out: `Cases` with the columns of the contact
-problem; `Batch` with the measures of all cases. `case_meshes.solve_cases` turns the one into the other. A case that is
-alone in its group is a single run.
+problem; `Batch` with the measures of all cases. `case_meshes.solve_cases` turns the one into the other.
 
 Letters of array shapes: n cases, p gap shapes, m interface nodes.
 """
