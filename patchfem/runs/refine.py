@@ -4,8 +4,8 @@ In: a function that solves a problem with a resolution, and one that judges the 
 the resolution along the axis that causes the errors of a measure (`find_refinable_axis`): the meshes of the patches or the
 steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_refined`). A run that would not meet its tolerance within
 accuracy.max_seconds, or whose next mesh would exceed accuracy.max_memory, is not repeated; its result names the axis and the
-time or memory that would be needed. The meshes of a single patch (`patch.mesh_levels`), curves, backbones and fits have
-loops of their own.
+time or memory that would be needed. The meshes of a patch (`patch.mesh_levels`) and of a group of patches
+(`patch.case_meshes`) are refined by the same loop. Curves, backbones and fits have loops of their own.
 """
 
 from collections.abc import Callable, Hashable, Iterable
@@ -89,6 +89,10 @@ class RunLimit(NamedTuple):
     begin: float
     clock: Callable[[], float] = measure_cpu_time
     bytes: float = DEFAULT_MAX_BYTES
+
+
+# of meshes, which have a largest predicted time of their own
+NO_LIMIT = RunLimit(inf, 0.0, bytes=inf)
 
 
 class WorstMeasure(NamedTuple):

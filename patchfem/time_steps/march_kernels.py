@@ -38,9 +38,9 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
 from . import flanks_kernels as flanks
+from . import laws_kernels as laws
 from . import lists_kernels as lists
 from . import normal_kernels as normal
-from .laws_kernels import slide_points
 from .march_rows_kernels import (
     N_PORT_COLUMNS,
     RESIDUAL,
@@ -149,7 +149,9 @@ def slide_block(system, block, step):
     if law == Law.LIST:
         lists.slide_lists(system.lists, numbers, values, count, step)
     else:
-        slide_points(law, numbers, points.memory[block], points.trial[block], values, count, step)
+        laws.slide_points(
+            law, numbers, points.memory[block], points.trial[block], values, count, step
+        )
 
 
 @njit(**NJIT_CALL)

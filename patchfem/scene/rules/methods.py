@@ -11,7 +11,6 @@ from ...effects import (
     law_has_trait,
     law_supports,
     law_takes_stiffness_or_length,
-    needs_bond_list,
     suggest_laws,
 )
 from ..keys.contact import Contact
@@ -178,6 +177,8 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     of a fixed number of values.
     """
     law = joint.law.law
+    if not (law_supports(joint.law, "harmonic") or law_supports(joint.law, "exact")):
+        return False
     if motion.grooves:
         return law_has_trait(law, "memoryless") and not (joint.compliance or joint.is_uneven)
     if joint.compliance:
@@ -186,7 +187,7 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
         # Regimes of the elastic-plastic law have springs that come and go with the load.
         is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)
         return law in VARYING_LAWS and not is_fixed
-    return not (needs_bond_list(joint.law) or motion.lower_shape or joint.is_uneven)
+    return not (motion.lower_shape or joint.is_uneven)
 
 
 def check_accuracy_method(draft: SceneDraft, kind: str) -> None:

@@ -133,6 +133,11 @@ class Joint(TableFacts):
         return grooves or (self.load_change and self.kind == "rig" and self.load_change_description)
 
     @property
+    def other_pressure(self) -> str:
+        """Key of what gives a pressure besides that of [contact] at rest; "" if nothing does."""
+        return self.heave_key or (self.scene.structure.interface and "[[structure.interface]]")
+
+    @property
     def unplaced_motion(self) -> str:
         """Key of a mode that turns or lifts a joint which has no places that move differently; "" if none does."""
         if self.kind != "rig" or self.contact.area:
@@ -183,7 +188,6 @@ class Feature(NamedTuple):
 JOINT_FEATURES = {
     # kinds of scenes and drives
     "rig": Feature(lambda j: j.kind == "rig"),
-    "load on a point": Feature(lambda j: j.scene.normal),
     "drive other than a sine": Feature(
         lambda j: j.scene.drive.kind == "free" or (j.wave.name and not j.wave.is_sine),
         "drive.waveform",
@@ -198,6 +202,9 @@ JOINT_FEATURES = {
     "mode with heave or pitch": Feature(lambda j: j.heave_key, "{heave_key}"),
     "mode that turns or lifts a joint without places": Feature(
         lambda j: j.unplaced_motion, "{unplaced_motion}", "a joint without places"
+    ),
+    "pressure in motion or of an interface": Feature(
+        lambda j: j.other_pressure, "{other_pressure}"
     ),
     "changing load or grooves": Feature(
         lambda j: j.load_change_or_grooves, "", "{load_change_or_grooves}"
