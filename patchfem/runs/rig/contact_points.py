@@ -147,7 +147,7 @@ def _list_bands(patch, surface: Surface, rows) -> list[Surface]:
     if surface.limits is not None:
         sums = [bands.sum_bands(patch, side) for side in surface.limits]
         limits = np.transpose(sums)[:, :, None]
-    return [
-        surface._replace(force=np.array([load]), row=row, limits=limit)
-        for load, row, limit in zip(loads, rows, limits)
-    ]
+    parts = []
+    for load, row, limit in zip(loads, rows, limits):
+        parts.append(surface._replace(force=np.array([load]), row=row, limits=limit))
+    return parts

@@ -105,6 +105,8 @@ class Runner:
     ----------
     solutions : dict
         Solution of each coarse run by its Numerics.
+    is_release : bool
+        Whether a rig is released, whose decay curve needs the histories from the start.
     """
 
     def __init__(self, model, patches, stiffer=None, progress=None, *, is_single: bool = False):
@@ -113,15 +115,13 @@ class Runner:
         self.stiffer = stiffer
         self.progress = progress
         self.is_single = is_single
+        self.is_release = model.rig is not None and model.rig.drive.kind == "free"
         self.solutions: dict[Numerics, Solution] = {}
         self._done = 0.0  # reported fraction of all runs
 
     def solve(self, numerics: Numerics, say=None) -> Solution:
         """Solve the rig on its finest meshes, and store the frames of the interface that its result shows."""
-        rig = self.model.rig
-        has_fields = self.patches[0] is not None or (
-            rig is not None and rig.friction.has_partial_slip
-        )
+        has_fields = self.patches[0] is not None or self.model.has_interface_patches
         return self._solve(
             self.model, numerics, self.patches[0], N_INTERFACE_FRAMES * has_fields, say
         )
@@ -139,8 +139,7 @@ class Runner:
             stiffer, (patch, *_) = self.stiffer[:2]
             model = replace(stiffer, rig=replace(stiffer.rig, drive=model.rig.drive))
         # The decay curve needs histories from the start of the run.
-        needs_whole = model.rig is not None and model.rig.drive.kind == "free"
-        return self._solve(model, replace(numerics, whole=needs_whole), patch)
+        return self._solve(model, replace(numerics, whole=self.is_release), patch)
 
     def _solve(self, model, numerics: Numerics, patch, frames: int = 0, say=None) -> Solution:
         """Solve a rig, and report the completed fraction of all runs.
@@ -465,7 +464,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
         measures = add_errors(
             solution.values, errors, min_relative_error=MIN_MOTION_RELATIVE_ERROR, size=size
         )
-        if solution.levels or (rig is not None and rig.drive.kind == "free"):
+        if solution.levels or runner.is_release:
             coarser_runs = [*time_runs, *space_runs]
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
         return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
