@@ -10,8 +10,8 @@ interface under a constant load. Optional features are:
 - `shear`: elastic pieces ([contact.shear]);
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
-- `harmonic`: steady motions over one period;
-- `march`: time steps with return maps (`time_steps.laws_kernels`).
+- `harmonic`: motions from event to event, and steady motions over one period, by a module of `hybrid.laws`;
+- `march`: time steps (`time_steps.laws`).
 
 Traits of laws:
 

@@ -9,16 +9,4 @@ A law is a number in `law_rows.Law`, a row of `laws.POINT_LAWS` and branches in 
 """
 
 # Names that other folders use, by module.
-PUBLIC = {
-    "case_rows": (
-        "MAX_STEPS",
-        "MAX_STEP_PHASE",
-        "SAME_CASE_CYCLE",
-        "SAME_SMOOTH_CYCLE",
-        "WINDOW_STEPS",
-        "Cases",
-        "Number",
-    ),
-    "cases": ("CaseMarch", "is_linear_between_events", "list_parameters", "march_cases"),
-    "laws": ("N_NUMBERS", "POINT_LAWS", "list_point_law"),
-}
+PUBLIC = {}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..core import PatchfemError
 from ..friction.bonds.parameters import Bonds
 from ..friction.grooves import Grooves
 from .laws import PointLaw
@@ -128,6 +129,15 @@ class Contact:
         while n_sets < len(self.point_sets) and self.point_sets[n_sets].shares_shear:
             n_sets += 1
         return self.point_sets[:n_sets]
+
+    @property
+    def law_module(self) -> str:
+        """Module of the law that has one of its own, without the name of the package; "" if all laws are numbered."""
+        laws = [point_set.law.law for point_set in self.point_sets]
+        modules = {law.partition(".")[2] for law in laws if isinstance(law, str)}
+        if len(modules) > 1:
+            raise PatchfemError(f"a march has at most one law with a module of its own: {modules}")
+        return next(iter(modules), "")
 
     @property
     def has_lists(self) -> bool:

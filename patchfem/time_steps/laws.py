@@ -1,10 +1,11 @@
 """Numbers and first memory of the laws of contact points, from keys of a scene or from parameters."""
 
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
 
-from ..core import MIN_LOAD, PatchfemError
+from ..core import MIN_LOAD
 from ..friction.bonds.parameters import Bonds, growth_numbers
 from ..friction.laws.iwan import slider_cells
 from .step_rows_kernels import VECTOR, WIDTH, BondRow, Law
@@ -44,7 +45,7 @@ class Sliders(NamedTuple):
 class PointLaw(NamedTuple):
     """Law of m contact points.
 
-    - law: number of the law
+    - law: number of the law, or the module that has its function `slide`
     - numbers (k, m), memory (l, m): as described by the law
     - load (m,): normal load [N] at the start
     - stiffness, viscosity (m,): of a point at rest [N/m], [N s/m]
@@ -52,7 +53,7 @@ class PointLaw(NamedTuple):
     - back (m,): load that limits a slide to -x [N], of a law that averages the pressure; None for `load`
     """
 
-    law: Law
+    law: Law | str
     numbers: np.ndarray
     memory: np.ndarray
     load: np.ndarray
@@ -101,13 +102,13 @@ class PointLaw(NamedTuple):
         return self.numbers[0] * self.load
 
 
-def _pack(law: Law, numbers, memory, load, stiffness=0.0, viscosity=0.0) -> PointLaw:
+def pack_points(law: Law | str, numbers, memory, load, stiffness=0.0, viscosity=0.0) -> PointLaw:
     """Return a PointLaw from its rows, which are floats or arrays (m,).
 
     Parameters
     ----------
-    law : Law
-        Number of the law.
+    law : Law or str
+        Number of the law, or the module that has its function.
     numbers, memory : sequence of float or (m,) array
         Rows of numbers and of the first memory.
     load : float or (m,) array
@@ -137,7 +138,7 @@ def make_cells(static, length, load, *, is_fixed: bool = False) -> PointLaw:
         Whether the stiffness stays that under `load` when the load changes.
     """
     length = np.maximum(length, MIN_LENGTH)
-    return _pack(
+    return pack_points(
         Law.CELLS, (static, length, float(is_fixed)), (0.0, load), load, static * load / length
     )
 
@@ -177,7 +178,7 @@ def make_iwan(law, load, n_cells: int = N_CELLS) -> PointLaw:
     softness = np.ones(count)
     softness[: forces.size] = 1 / cells.yield_displacement
     stiffness = law.stiffness * np.asarray(load, float)
-    points = _pack(Law.SLIDERS, (law.static,), (0.0,), load, stiffness)
+    points = pack_points(Law.SLIDERS, (law.static,), (0.0,), load, stiffness)
     return points._replace(sliders=Sliders(weights, softness))
 
 
@@ -187,13 +188,15 @@ def make_bonds(bonds: Bonds, load) -> PointLaw:
     numbers = (bonds.static, bonds.length, *growth_numbers(bonds), bonds.initial, *rest)
     load = np.asarray(load, float)
     memory = (bonds.length, bonds.initial * load, 0.0, 0.0)
-    return _pack(Law.BONDS, numbers, memory, load, bonds.static * load / bonds.length)
+    return pack_points(Law.BONDS, numbers, memory, load, bonds.static * load / bonds.length)
 
 
 def make_list(bonds: Bonds, load) -> PointLaw:
     """Return points under a load [N] whose bonds are summed one by one, over lists."""
     load = np.asarray(load, float)
-    return _pack(Law.LIST, (bonds.static, 0.0), (0.0,), load, bonds.static * load / bonds.length)
+    return pack_points(
+        Law.LIST, (bonds.static, 0.0), (0.0,), load, bonds.static * load / bonds.length
+    )
 
 
 def keep_loads(points: PointLaw) -> PointLaw:
@@ -213,14 +216,14 @@ def make_lugre(law, load) -> PointLaw:
     load = np.asarray(load, float)
     viscosity = (law.micro_damping + law.viscous) * load
     memory = (length, load, 0.0, 0.0)
-    return _pack(Law.BONDS, numbers, memory, load, law.stiffness * load, viscosity)
+    return pack_points(Law.BONDS, numbers, memory, load, law.stiffness * load, viscosity)
 
 
 def make_bouc_wen(law, load) -> PointLaw:
     """Return points of the Bouc-Wen law (`friction.laws.bouc_wen.BoucWen`) under a load [N]."""
     numbers = (law.static, law.length, law.exponent, law.shape)
     stiffness = law.static * np.asarray(load, float) / law.length
-    return _pack(Law.BOUC_WEN, numbers, (0.0, load), load, stiffness)
+    return pack_points(Law.BOUC_WEN, numbers, (0.0, load), load, stiffness)
 
 
 def make_tanh(law, load, compliance=0.0) -> PointLaw:
@@ -248,7 +251,7 @@ def make_tanh(law, load, compliance=0.0) -> PointLaw:
         stiffness = 0.0
         viscosity = law.static * load / law.speed
     numbers = (law.static, law.speed, compliance)
-    return _pack(Law.TANH, numbers, (0.0, 0.0, 0.0), load, stiffness, viscosity)
+    return pack_points(Law.TANH, numbers, (0.0, 0.0, 0.0), load, stiffness, viscosity)
 
 
 def make_coulomb(law, load, compliance=0.0) -> PointLaw:
@@ -274,18 +277,18 @@ def make_coulomb(law, load, compliance=0.0) -> PointLaw:
         length = law.static * reference * np.asarray(compliance)
         stiffness = law.static * reference / length
         numbers = (law.static, length, 1.0)
-        return _pack(Law.CELLS, numbers, (0.0, reference), load, stiffness)
-    return _pack(Law.COULOMB, (law.static, law.kinetic), (0.0,), load)
+        return pack_points(Law.CELLS, numbers, (0.0, reference), load, stiffness)
+    return pack_points(Law.COULOMB, (law.static, law.kinetic), (0.0,), load)
 
 
 def make_cubic(stiffness: float) -> PointLaw:
     """Return a spring of force stiffness q^3, with the stiffness in N/m3."""
-    return _pack(Law.CUBIC, (stiffness,), (0.0,), 1.0)
+    return pack_points(Law.CUBIC, (stiffness,), (0.0,), 1.0)
 
 
 def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
     """Return a spring whose force is sinusoidal, of stiffness [N/m] at rest and a wavelength [m]."""
-    return _pack(Law.INTERLOCK, (stiffness, wavelength), (0.0,), 1.0, stiffness)
+    return pack_points(Law.INTERLOCK, (stiffness, wavelength), (0.0,), 1.0, stiffness)
 
 
 def _make_elastic_plastic(law, load, compliance=0.0) -> PointLaw:
@@ -293,7 +296,7 @@ def _make_elastic_plastic(law, load, compliance=0.0) -> PointLaw:
     return make_cells(law.static, law.length, load)
 
 
-# Function (law, load) that returns the points of a law, by `friction.law`
+# Function (law, load) that returns the points of a law, by `friction.law`; other laws have a module with `make_points`
 MAKERS = {
     "coulomb": make_coulomb,
     "convolution": make_coulomb,
@@ -321,17 +324,10 @@ def make_point_law(name: str, law, load, compliance=0.0) -> PointLaw:
         Normal load [N].
     compliance : float or (m,) array
         Compliance [m/N] of the shear modes left out, which the laws in STIFF_LAWS need.
-
-    Raises
-    ------
-    PatchfemError
-        If the law has no function for points.
     """
-    if name not in MAKERS:
-        raise PatchfemError(
-            f"a bench and time steps need a function of the law '{name}' for points; add it to time_steps/laws.py"
-        )
     load = np.maximum(load, MIN_LOAD)
+    if name not in MAKERS:
+        return import_module(f"{__package__}.{name}_kernels").make_points(law, load)
     if name in STIFF_LAWS:
         return MAKERS[name](law, load, compliance)
     return MAKERS[name](law, load)

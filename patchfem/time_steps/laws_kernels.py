@@ -2,6 +2,7 @@
 
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
+from . import no_law_kernels as own
 from .bonds_kernels import slide_bonds
 from .bouc_wen_kernels import slide_bouc_wen
 from .cells_kernels import slide_cells, slide_sliders
@@ -30,6 +31,8 @@ def slide_points(law, numbers, memory, trial, values, count, step):
         slide_cubic(numbers, memory, trial, values, count, step)
     elif law == Law.INTERLOCK:
         slide_interlock(numbers, memory, trial, values, count, step)
+    elif law == Law.OWN:
+        own.slide(numbers, memory, trial, values, count, step)
 
 
 @njit(**NJIT_KERNEL)

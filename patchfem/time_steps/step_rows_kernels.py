@@ -21,6 +21,7 @@ class Law(IntEnum):
     - CUBIC, INTERLOCK: nonlinear springs
     - COULOMB: rigid friction of a port, which is solved with the motion of this port
     - LIST: bonds that are summed one by one
+    - OWN: a law with a module of its own, of which a march has at most one
     """
 
     CELLS = 0
@@ -32,6 +33,7 @@ class Law(IntEnum):
     COULOMB = 6
     LIST = 7
     SLIDERS = 8
+    OWN = 9
 
 
 class Value(IntEnum):

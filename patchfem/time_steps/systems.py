@@ -348,7 +348,7 @@ def _make_points(contact, n_ports: int) -> Points:
     shear[Shear.SCALE] = [np.sqrt(np.count_nonzero(part) / (part @ part)) for part in parts]
     n_nodes = 0 if contact.sets is None else contact.sets.x.size
     return Points(
-        np.repeat([int(point_set.law.law) for point_set in sets], counts).astype(np.int64),
+        np.repeat([_number_law(point_set.law.law) for point_set in sets], counts).astype(np.int64),
         np.repeat(np.arange(len(counts)), counts),
         np.concatenate([np.zeros(0, np.int64), *(part.count for part in blocks)]),
         _count_memory(sets, blocks),
@@ -371,6 +371,11 @@ def _make_points(contact, n_ports: int) -> Points:
         np.zeros(1),
         np.zeros((stiffness.size, 2)),
     )
+
+
+def _number_law(law: Law | str) -> int:
+    """Return the number of a law, or of one with a module of its own."""
+    return int(Law.OWN if isinstance(law, str) else law)
 
 
 def _number_shears(sets, n_ports: int) -> np.ndarray:

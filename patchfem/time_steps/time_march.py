@@ -137,10 +137,12 @@ def load_kernels(contact: Contact, say=None):
     parts = {}
     if contact.sets is None:
         parts["normal"] = "time_steps.no_normal_kernels"
-    lists = {}
+    step_parts = dict(parts)
     if not contact.has_lists:
-        lists["lists"] = "time_steps.no_lists_kernels"
-    steps = compiled.instantiate("time_steps.march_kernels", parts | lists, say)
+        step_parts["lists"] = "time_steps.no_lists_kernels"
+    if module := contact.law_module:
+        step_parts["laws"] = compiled.instantiate("time_steps.laws_kernels", {"own": module}, say)
+    steps = compiled.instantiate("time_steps.march_kernels", step_parts, say)
     return compiled.instantiate("time_steps.loop_kernels", parts | {"steps": steps}, say)
 
 

@@ -29,9 +29,9 @@ SETS = {
     "changing load or grooves": "{change}",
     "drive other than a sine": "drive.waveform=step",
     "grooves": GROOVES,
+    "pressure in motion or of an interface": "structure.mode.second.pitch=1_rad/m",
     "interface": "",
     "kinetic below static": "{law}.law=coulomb {law}.kinetic=0.2",
-    "load on a point": "",
     "joint without a single stiffness": "{change}",
     "nonlinear asperities": EXPONENTIAL,
     "output that bounds the motion": "structure.travel=1_mm",
@@ -57,8 +57,7 @@ REDUCED = POINT_RIG[: POINT_RIG.index("[structure]")] + (
     '[structure.reduced]\nstiffness = "k.mtx"\nmass = "m.mtx"\nboundary = [1, 2]\nslide = [1, 0]\n'
     + LINEAR[LINEAR.index("[drive]") :]
 )
-POINT_FEATURES = {"load on a point"}
-MASS_FEATURES = {"interface", "structure.interface"}
+MASS_FEATURES = {"interface"}
 
 
 FILE = """\
@@ -84,9 +83,6 @@ def choose_base(features: set[str]) -> tuple[str, dict[str, str]]:
     if features & MASS_FEATURES:
         law = "structure.interface.0"
         return PAIR + FORCED, words | {"law": law, "patch": f"{law}.contact"}
-    if features & POINT_FEATURES:
-        words |= {"load": "normal", "change": SETS["normal.amplitude"]}
-        return POINT_RIG, words
     return RIG, words
 
 

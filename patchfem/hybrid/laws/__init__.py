@@ -14,17 +14,19 @@ its `records.LawNumbers` from the law of `friction.laws` and a mean load [N]. In
 have the opposite sign, or the factors that STATE_SIGNS lists, and `memory[FLAG]` has the factor FLAG_SIGN, 1 by default.
 
 A law that stores energy has an entry in `stored_energy.ENERGY_OF_LAW`. LAWS lists the modules; the number of a law is its
-place. LAW_OF_NAME gives the module for each `friction.law`, and VARYING_LAW_OF_NAME that under a load that varies.
+place. LAW_OF_NAME gives the module for each `friction.law`, by default that of its name, and VARYING_LAW_OF_NAME that under
+a load that varies.
 """
 
 from collections.abc import Sequence
 from importlib import import_module
 from math import inf
 
+from ... import effects
 from ...core import MIN_LOAD, PatchfemError
 from ..records import LawNumbers, Memory, State
 
-LAWS = (
+_PACKAGE_LAWS = (
     "coulomb",
     "tanh",
     "masing",
@@ -45,6 +47,13 @@ LAW_OF_NAME = {
     "lugre": "lugre",
     "nonlocal": "bonds",
 }
+_OWN_LAWS = [
+    name
+    for name, law in effects.LAWS.items()
+    if "harmonic" in law.supports.split() and name not in LAW_OF_NAME
+]
+LAW_OF_NAME |= dict(zip(_OWN_LAWS, _OWN_LAWS))
+LAWS = (*_PACKAGE_LAWS, *_OWN_LAWS)
 VARYING_LAW_OF_NAME = {
     "coulomb": "coulomb",
     "tanh": "tanh",

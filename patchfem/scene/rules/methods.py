@@ -11,7 +11,6 @@ from ...effects import (
     law_has_trait,
     law_supports,
     law_takes_stiffness_or_length,
-    needs_bond_list,
     suggest_laws,
 )
 from ..keys.contact import Contact
@@ -160,13 +159,13 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
         elif support.law == "pieces" and is_rigid:
             is_supported &= not law_has_trait(joint.law.law, "set-valued")
         elif support.law == "pieces":
-            is_supported = _has_elements(joint)
+            is_supported = has_shear_elements(joint)
         if not is_supported:
             return joint
     return None
 
 
-def _has_elements(joint: Joint) -> bool:
+def has_shear_elements(joint: Joint) -> bool:
     """Return whether an interface that slips part by part is a set of parallel elements."""
     return law_supports(joint.law, "pieces") and law_supports(joint.law, "shear")
 
@@ -178,15 +177,17 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     of a fixed number of values.
     """
     law = joint.law.law
+    if not (law_supports(joint.law, "harmonic") or law_supports(joint.law, "exact")):
+        return False
     if motion.grooves:
         return law_has_trait(law, "memoryless") and not (joint.compliance or joint.is_uneven)
     if joint.compliance:
-        return _has_elements(joint)
+        return has_shear_elements(joint)
     if motion.load_change:
         # Regimes of the elastic-plastic law have springs that come and go with the load.
         is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)
         return law in VARYING_LAWS and not is_fixed
-    return not (needs_bond_list(joint.law) or motion.lower_shape or joint.is_uneven)
+    return not (motion.lower_shape or joint.is_uneven)
 
 
 def check_accuracy_method(draft: SceneDraft, kind: str) -> None:

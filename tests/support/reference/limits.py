@@ -117,7 +117,7 @@ infinite; any computed value of this peak would depend on the mesh.
 
 
 ADVICE = {  # Property of a joint in the advice of a row -> its meaning.
-    "{heave_key}": "the heave and the pitch of the modes",
+    "{other_pressure}": "the other pressure",
 }
 SHAPES = [
     f"`{header.replace('contact', 'patch')}`"
@@ -126,7 +126,7 @@ SHAPES = [
 ]
 MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its keys.
     "rig": "`[drive]` with `[friction]` or `[[structure.interface]]`",
-    "load on a point": "`[normal]`",
+    "pressure in motion or of an interface": "a mode with heave or pitch, or `[[structure.interface]]`",
     "mode that turns or lifts a joint without places": "a mode with yaw and no `[contact.area]`, or a mode with heave or "
     "pitch and `[normal]`",
     "drive other than a sine": "`drive.kind` is `free`, or `drive.waveform` is not `sine`",
