@@ -291,6 +291,15 @@ def advance(body, left, observes, now, seen):
         dt = 0.5 * left
     taken = take_step(first, dt, body)
 
+    # A velocity that falls and rises again may turn on the way.
+    falls = first.velocity * first.acceleration < 0
+    if falls and first.velocity * taken.velocity > 0 and taken.velocity * taken.acceleration > 0:
+        part = first.acceleration / (first.acceleration - taken.acceleration)
+        lowest = take_step(first, part * dt, body)
+        if first.velocity * lowest.velocity < 0:
+            dt *= part
+            taken = lowest
+
     # The step ends at a turn, after which the law is stiff again, or at the corner of the law before it.
     turns = first.velocity * taken.velocity < 0
     branch = find_branch(first, body.law)
