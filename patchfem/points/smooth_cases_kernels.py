@@ -52,14 +52,12 @@ class Body(NamedTuple):
     - law: numbers and memory of its law
     - grade: length of the steps relative to that with REFERENCE_STEPS per cycle
     - step: longest step [s]
-    - half_turn: cosine and sine of half the phase of the drive that passes in it
     """
 
     case: np.ndarray
     law: PointLaw
     grade: float
     step: float
-    half_turn: tuple[float, float]
 
 
 class Taken(NamedTuple):
@@ -91,10 +89,7 @@ def make_body(case, law, steps):
     steps : float
         Fewest steps per cycle.
     """
-    half = pi / steps
-    step = 2 * half / case[Number.OMEGA]
-    grade = REFERENCE_STEPS / steps
-    return Body(case, law, grade, step, (cos(half), sin(half)))
+    return Body(case, law, REFERENCE_STEPS / steps, 2 * pi / steps / case[Number.OMEGA])
 
 
 @njit(**NJIT_CALL)
@@ -113,10 +108,8 @@ def take_step(first, dt, body):
     law = body.law
     kind = law.numbers[0]
     half = 0.5 * dt
-    c, s = body.half_turn
-    if dt != body.step:
-        c = cos(case[Number.OMEGA] * half)
-        s = sin(case[Number.OMEGA] * half)
+    c = cos(case[Number.OMEGA] * half)
+    s = sin(case[Number.OMEGA] * half)
     sine = first.sine * c + first.cosine * s
     cosine = first.cosine * c - first.sine * s
     last_sine = sine * c + cosine * s
@@ -297,6 +290,15 @@ def advance(body, left, observes, now, seen):
     elif left < 2 * dt:
         dt = 0.5 * left
     taken = take_step(first, dt, body)
+
+    # A velocity that falls and rises again may turn on the way.
+    falls = first.velocity * first.acceleration < 0
+    if falls and first.velocity * taken.velocity > 0 and taken.velocity * taken.acceleration > 0:
+        part = first.acceleration / (first.acceleration - taken.acceleration)
+        lowest = take_step(first, part * dt, body)
+        if first.velocity * lowest.velocity < 0:
+            dt *= part
+            taken = lowest
 
     # The step ends at a turn, after which the law is stiff again, or at the corner of the law before it.
     turns = first.velocity * taken.velocity < 0
