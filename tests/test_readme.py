@@ -100,6 +100,29 @@ def test_always_guide_python_example_runs(tmp_path, monkeypatch):
     assert len(names["axes"].lines) == 2 and (tmp_path / "out/mine/summary.json").is_file()
 
 
+@pytest.mark.slow
+def test_exact_guide_numbers_of_damper_are_reproduced(tmp_path, monkeypatch):
+    """The commands of the page on responses run, and their answers are those of the page."""
+    monkeypatch.chdir(tmp_path)
+    page = read_page("patchfem/scene/guide/response.md")
+    text = " ".join(page.replace("\n> ", " ").split())
+    blocks = re.findall(r"```bash\n(.*?)```", page, re.S)
+    answers = []
+    for line in "".join(blocks).replace("\\\n", "").splitlines():
+        if "cases/*" not in line:
+            answers.append(run_successfully(*shlex.split(line)[1:]).out)
+    measures = read_json("out/curve/summary.json")["measures"]
+    peak = measures["relative_displacement_amplitude"]["value"]
+    assert f"here {1e6 * peak:.1f} um" in text
+    assert f"here {measures['peak_frequency']['value']:.2f} Hz" in text
+    quotes = re.findall(r"(?:^> .*\n)+", page, re.M)
+    assert len(quotes) == 2
+    for quote in quotes:
+        assert any(
+            " ".join(quote.replace("> ", "").split()) in " ".join(one.split()) for one in answers
+        )
+
+
 @pytest.fixture
 def run_recipe(tmp_path, monkeypatch):
     """Return a function that goes through a door of the README, given its task, and returns the output.
@@ -107,11 +130,8 @@ def run_recipe(tmp_path, monkeypatch):
     The folder contains only the files that the commands name.
     """
     monkeypatch.chdir(tmp_path)
-    lines = re.search(r"## Five doors\n.*?```bash\n(.*?)```", read_page("README.md"), re.S)[1]
-    commands = {
-        question.strip().partition(":")[0]: command
-        for command, _, question in (line.partition("#") for line in lines.splitlines())
-    }
+    doors = read_page("README.md").partition("## Five doors")[2].partition("## A scene")[0]
+    commands = dict(re.findall(r"^\| \[(.*?)\].* \| `(.*)` \|$", doors, re.M))
     assert len(commands) == 5
     for name in re.findall(r"studies/\S+", " ".join(commands.values())):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -9,13 +9,5 @@ Read `run` first.
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "shared": (
-        "CommandExit",
-        "UsageError",
-        "print_message",
-    ),
-    "streams": (
-        "make_printable",
-        "prepare_streams",
-    ),
+    "streams": ("make_printable",),
 }

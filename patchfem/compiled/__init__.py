@@ -43,15 +43,7 @@ from .portable import read_portable_codes
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "flags_kernels": (
-        "FASTMATH_FLAGS",
-        "NJIT_CALL",
-        "NJIT_KERNEL",
-    ),
-    "jit": (
-        "NJIT_NO_REFCOUNT",
-        "njit",
-    ),
+    "jit": ("njit",),
 }
 
 PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package

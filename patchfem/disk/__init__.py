@@ -10,37 +10,10 @@ versions. Read `atomic_write` first.
 # Names that other folders use, by module.
 PUBLIC = {
     "atomic_write": (
-        "RESUMABLE_FOLDERS",
-        "WriteError",
-        "explain_mkdir_error",
-        "explain_write_error",
         "is_partial_name",
         "open_lossy",
         "write_atomically",
-        "write_bytes",
-        "write_rows",
         "write_text",
     ),
-    "deferred_signals": ("defer_signals",),
-    "exchange": (
-        "make_old_folder_path",
-        "replace_folder",
-        "restore_folder",
-    ),
-    "file_hashes": (
-        "hash_named_files",
-        "iterate_texts",
-    ),
-    "installed": (
-        "find_package_version",
-        "list_installed_versions",
-    ),
-    "lock": ("FolderLock", "lock_file"),
-    "open_with_timeout": ("open_for_reading",),
-    "user_cache": (
-        "find_cache_base",
-        "make_process_folder",
-        "prepare_folder",
-        "write_cache_file",
-    ),
+    "lock": ("FolderLock",),
 }

@@ -17,10 +17,7 @@ compliance of the interface is the inverse of the Schur complement S = K_ss - K_
 
 # Names that other folders use, by module
 PUBLIC = {
-    "coating_traction": (
-        "compute_coating_traction",
-        "interpolate_coating_traction",
-    ),
+    "coating_traction": ("compute_coating_traction",),
     "elasticity": (
         "Layers",
         "Piece",
@@ -28,22 +25,9 @@ PUBLIC = {
         "compute_interface_compliance",
         "von_mises",
     ),
-    "lapack": (
-        "cho_factor",
-        "cho_solve",
-        "dpotrf",
-        "dpotrs",
-        "dtrsm",
-        "dtrtri",
-        "use_one_blas_thread",
-    ),
-    "mortar": (
-        "PieceInterface",
-        "join_pieces",
-    ),
+    "mortar": ("PieceInterface",),
     "recovery": (
         "Cells",
-        "StressError",
         "compute_centre_stress",
         "estimate_error",
         "fit_recovery",
@@ -54,9 +38,5 @@ PUBLIC = {
         "BlockShape",
         "LayerStack",
         "make_stack",
-    ),
-    "sparse_factor": (
-        "SparseFactor",
-        "ZeroEnergyMotion",
     ),
 }

@@ -30,6 +30,7 @@ from .answer import (
 )
 from .charts import axes
 from .netcdf import from_dataset
+from .rows import make_details
 from .runs import make_origin
 
 # Columns of a curve and of its band, their units, and words for them in a sentence
@@ -274,28 +275,19 @@ def _find_unit(name: str) -> str:
 
 def _make_details(backbone: Backbone) -> JsonObject:
     """Return the content of backbone.json in SI units."""
-    frequencies = backbone.frequencies
     band = backbone.band
     curves = {}
     for method, curve in backbone.curves.items():
         curves[method] = {name: getattr(curve, name) for name in CURVE_COLUMNS}
 
     # A backbone without a band has None in place of its method and columns
-    return {
-        "mode": backbone.mode,
-        "free_frequency": frequencies.free,
-        "free_frequency_error": frequencies.free_error,
-        "stuck_frequency": frequencies.stuck,
-        "stuck_frequency_error": frequencies.stuck_error,
-        "curves": curves,
-        "missing": backbone.missing,
-        "exponent": backbone.exponents,
-        "flutter_amplitude": backbone.flutter,
-        "notes": backbone.notes,
-        "method": band and band.method,
-        "band": band and {name: getattr(band, name) for name in BAND_COLUMNS},
-        "advice": " ".join(backbone.advice),
-    }
+    return make_details(
+        "backbone",
+        backbone,
+        curves=curves,
+        band=band and {name: getattr(band, name) for name in BAND_COLUMNS},
+        advice=" ".join(backbone.advice),
+    )
 
 
 def _make_cases_answer(cases: BackboneCases) -> Answer:

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import __version__
 from ..campaigns.fits.curve import CURVE_EXTENSION_RATIO, FITTED_NAMES, CurveComparison
 from ..campaigns.fits.loop import LoopComparison
 from ..campaigns.fits.options import FitOptions
@@ -33,7 +32,7 @@ from .answer import (
     encode_texts,
 )
 from .quantities import format_quantity
-from .rows import make_variables
+from .rows import make_details, make_variables
 from .run_data import SENSOR_UNITS
 from .runs import make_origin
 
@@ -123,26 +122,18 @@ def make_answer(fitted: FittedKeys) -> Answer:
         }
     unknown = [dict(zip(values, row, strict=True)) for row in fit.intervals.unknown.tolist()]
 
-    details = {
-        "patchfem": __version__,
-        "title": scene.title,
-        "outcome": str(fit.outcome),
-        "measured": comparison.path.name,
-        "values": values,
-        "unknown": [{name: part for name, part in row.items() if part} for row in unknown],
-        "correlation": fit.intervals.correlation,
-        "evaluations": fit.counts.evaluations,
-        "failures": fit.counts.failures,
-        "descents_agreed": fit.n_best,
-        "rows": (~fitted.held_out).sum(),
-        "effective_rows": fit.intervals.rows,
-        "held": fitted.held_out.sum(),
-        "warnings": fitted.warnings,
-        "notes": fitted.notes,
-        "seconds": round(fitted.seconds, 6),
-        "scores": {name: score.value for name, score in parts.scores.items()},
-        **parts.details,
-    }
+    details = make_details(
+        "fit",
+        fitted,
+        outcome=str(fit.outcome),
+        values=values,
+        unknown=[{name: part for name, part in row.items() if part} for row in unknown],
+        rows=(~fitted.held_out).sum(),
+        held=fitted.held_out.sum(),
+        seconds=round(fitted.seconds, 6),
+        scores={name: score.value for name, score in parts.scores.items()},
+    )
+    details |= parts.details
 
     # the verdict names the most correlated pair of values if their correlation is strong
     verdict = [_make_headline(details, measures), parts.residual]
@@ -170,7 +161,8 @@ def _make_headline(details: JsonObject, measures: Quantities) -> str:
     named = list(measures.items())[:MAX_HEADLINE_VALUES]
     text = ", ".join(f"{key} = {format_quantity(key, one)}" for key, one in named)
     if len(measures) > len(named):
-        text += f" and {len(measures) - len(named)} more"
+        count = len(measures) - len(named)
+        text += f" and {count} more key{'s' * (count > 1)}"
     if details["outcome"] != "done":
         return f"The fit to {details['measured']} did not converge; best values so far: {text}."
     return f"Fitted to {details['measured']}: {text}."

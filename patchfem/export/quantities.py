@@ -25,8 +25,6 @@ MAX_KEY_QUANTITIES = 10  # largest number of key quantities on a page and on the
 MIN_RELATIVE_HALF_WIDTH = 1e-9
 # Largest number of digits of the end of an interval, which has two digits of the half-width
 MAX_INTERVAL_END_DIGITS = 11
-# Significant digits of quantities of measured surfaces without an error; traces have no more
-SURFACE_QUANTITY_DIGITS = 4
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
 PERCENT_NAME_ENDINGS = ("fraction", "share")
 # display units of wear coefficients and of slopes
@@ -146,12 +144,12 @@ def format_quantity(name: str, quantity: Quantity) -> str:
 
 def _find_digits(name: str) -> int | None:
     """Return the number of digits to show of a quantity without an error; None for a measure of a run: all digits."""
-    if name in QUANTITIES:
-        return QUANTITIES[name].digits
-    base_name = remove_interface_number(name)
-    if base_name in patch_rows.PATCH_TABLE or base_name in response.rows.MOTION_TABLE:
-        return None
-    return SURFACE_QUANTITY_DIGITS if surface_definitions.find_surface_definition(name) else None
+    found = (
+        _find_row(name)
+        or _find_row(remove_interface_number(name))
+        or surface_definitions.find_surface_definition(name)
+    )
+    return getattr(found, "digits", None)
 
 
 def format_value(value: float | str, unit: str, digits: int = 4, name: str = "") -> str:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .answer import RUN_KINDS, Definition, Row, Variables, make_column
+from .. import __version__
+from .answer import RUN_KINDS, Definition, JsonObject, Row, Variables, make_column
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +134,8 @@ VARIABLES: dict[str, dict[str, Row]] = {
     for group, rows in _TABLES["variables"].items()
 }
 QUANTITIES = {name: Definition(*row) for name, row in _TABLES["quantities"].items()}
+# places of the keys of JSON files in the record of the verb
+DETAILS: dict[str, dict[str, str]] = _TABLES["details"]
 # words of the measures in the headline of a run, by its kind
 HEADLINES: dict[str, dict[str, str]] = _TABLES["headlines"]
 CHARTS: dict[str, tuple[Chart, ...]] = _repeat_for_runs(
@@ -142,6 +145,8 @@ CSV_FILES: dict[str, dict[str, CsvFile]] = {
     kind: {name: CsvFile(**row) for name, row in rows.items()}
     for kind, rows in _TABLES["csv_files"].items()
 }
+# what a file beside a page is, by its name or its ending
+FILE_DESCRIPTIONS: dict[str, str] = _TABLES["files"]
 # tables that stand below the charts
 TABLES: dict[str, tuple[Table, ...]] = _repeat_for_runs(
     {kind: tuple(Table(**row) for row in rows) for kind, rows in _TABLES["tables"].items()}
@@ -169,3 +174,37 @@ def make_variables(group: str, **columns: Any) -> Variables:
             row = row._replace(unit=unit)
         variables[name] = make_column(name, values, row)
     return variables
+
+
+def look_up(value, place: str):
+    """Return the content of a place below an object, such as "window.extra.ledger.0", or None if it does not exist.
+
+    The parts of the place are names of attributes, keys of dicts and indices.
+    """
+    for name in place.split("."):
+        if isinstance(value, dict):
+            value = value.get(name)
+        else:
+            value = value[int(name)] if name.isdigit() else getattr(value, name, None)
+        if value is None:
+            return None
+    return value
+
+
+def make_details(kind: str, record, **computed: Any) -> JsonObject:
+    """Return the keys of a JSON file in the order of their rows.
+
+    Parameters
+    ----------
+    kind : str
+        Group of rows, such as "fit".
+    record : object
+        Record of the verb, in which the rows have their places.
+    **computed
+        Values of the keys that have no place in it, except the version.
+    """
+    computed["patchfem"] = __version__
+    details = {}
+    for name, place in DETAILS[kind].items():
+        details[name] = computed[name] if name in computed else look_up(record, place)
+    return details

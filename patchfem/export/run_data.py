@@ -27,7 +27,7 @@ from .answer import (
     make_column,
     make_columns,
 )
-from .rows import VARIABLES, make_variables
+from .rows import VARIABLES, look_up, make_variables
 
 # Largest difference of the drive frequencies of a run and of a measured row that belongs to it
 MAX_FREQUENCY_DIFFERENCE_HZ = 0.5
@@ -61,7 +61,7 @@ def _read_row(result: Result, name: str, row: Row) -> Variables:
     Names become strings. `row` has the places of the values in the run, with dimensions
     and unit.
     """
-    found = (_look_up(result, place) for place in row.places.split())
+    found = (look_up(result, place) for place in row.places.split())
     values = next((one for one in found if one is not None), None)
     if values is None or not np.size(values):
         return {}
@@ -70,21 +70,6 @@ def _read_row(result: Result, name: str, row: Row) -> Variables:
     if row.unit == "" and not row.meanings:
         values = np.array([str(value) for value in values])
     return {name: make_column(name, values, row)}
-
-
-def _look_up(value, place: str):
-    """Return the content of a place below an object, such as "window.extra.ledger.0", or None if it does not exist.
-
-    The parts of the place are names of attributes, keys of dicts and indices.
-    """
-    for name in place.split("."):
-        if isinstance(value, dict):
-            value = value.get(name)
-        else:
-            value = value[int(name)] if name.isdigit() else getattr(value, name, None)
-        if value is None:
-            return None
-    return value
 
 
 def _collect_motion(result: Result) -> Variables:
@@ -267,19 +252,20 @@ def _collect_levels(result: Result) -> Variables:
         return {}
     unit = levels[0].unit
     drive_text = "force" if unit == "N" else "acceleration of the base"
-    columns = {"level_drive": ([level.drive for level in levels], unit, drive_text)}
-    data = make_columns("level", columns)
+    drives = [level.drive for level in levels]
+    data = make_columns("level", {"level_drive": (drives, unit, drive_text)})
     data |= make_variables("run", level_stuck=[level.stuck for level in levels])
-    columns = {}
+
+    measures = {}
     table = response.rows.MOTION_TABLE
     for name in response.events.LEVEL_MEASURES:
         if any(name in level.values for level in levels):
             unit = table[name].unit
             values = [level.values.get(name, np.nan) for level in levels]
             errors = [level.errors.get(name, np.nan) for level in levels]
-            columns[f"level_{name}"] = (values, unit, table[name].text)
-            columns[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
-    return data | make_columns("level", columns)
+            measures[f"level_{name}"] = (values, unit, table[name].text)
+            measures[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
+    return data | make_columns("level", measures)
 
 
 def _collect_regimes(result: Result) -> Variables:

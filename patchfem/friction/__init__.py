@@ -9,46 +9,18 @@ the load climbs. `path_work` computes the friction work of samples. Read `protoc
 # Names that other folders use, by module
 PUBLIC = {
     "bonds.engines": (
-        "RECURSION",
         "RequestedEngine",
         "choose_engine",
     ),
-    "bonds.list_numbers": ("join_lists", "make_lists", "make_no_lists"),
     "bonds.parameters": (
         "Bonds",
         "growth_numbers",
-        "growth_path_ratio",
-    ),
-    "bonds.point_kernels": (
-        "bond_mean",
-        "bond_step",
-        "grow",
-        "press_point",
     ),
     "bonds.spread": ("carried_fraction",),
-    "bonds.strip_kernels": (
-        "advance_list",
-        "slide_list",
-    ),
-    "bonds.strip_rows_kernels": (
-        "BondLists",
-        "ListLaw",
-        "ListState",
-    ),
     "grooves": ("Grooves",),
-    "laws.bouc_wen_kernels": ("follow_path",),
-    "laws.coulomb": ("Coulomb",),
-    "laws.elastic_plastic": ("masing_loop",),
-    "laws.lugre": ("LuGre",),
-    "laws.lugre_kernels": (
-        "find_force",
-        "relaxation_length",
-    ),
-    "path_work": ("sampled_work",),
     "protocol": ("SteadyLoop",),
     "record": (
         "make_law",
         "steady_loop",
-        "stick_stiffness",
     ),
 }

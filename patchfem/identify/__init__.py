@@ -7,10 +7,7 @@ parameters that the data do not determine; frequencies, damping ratios and shape
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "least_squares": (
-        "Fit",
-        "Problem",
-    ),
+    "least_squares": ("Problem",),
     "measured_modes": (
         "compute_decay_curve",
         "identify_decay_modes",

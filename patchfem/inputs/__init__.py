@@ -15,48 +15,18 @@ Read `tables` first.
 # Names that other folders use, by module.
 PUBLIC = {
     "laboratory": ("read_records",),
-    "loops": (
-        "Loop",
-        "read_loop",
-    ),
+    "loops": ("read_loop",),
     "matlab": (
         "read_real_arrays",
         "read_variables",
     ),
-    "matrices": (
-        "Matrix",
-        "align_rows",
-        "read_matrix",
-    ),
-    "measured": (
-        "is_readable",
-        "read_table",
-    ),
-    "packed": (
-        "count_zip_bytes",
-        "open_arrays",
-        "refuse_large_content",
-    ),
-    "records": (
-        "parse_requests",
-        "shift_to_zero",
-    ),
-    "signals": (
-        "read_signal",
-        "read_spectrum",
-    ),
+    "matrices": ("read_matrix",),
+    "measured": ("read_table",),
+    "records": ("parse_requests",),
+    "signals": ("read_signal",),
     "slides": ("read_slide",),
     "tables": (
-        "NUMBER_PATTERN",
         "TableFormat",
-        "find_factors",
         "read_columns",
-        "read_text",
-    ),
-    "units": ("SI_UNITS",),
-    "universal": (
-        "Dataset",
-        "find_unit_factors",
-        "read_datasets",
     ),
 }

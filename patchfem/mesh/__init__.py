@@ -22,7 +22,6 @@ PUBLIC = {
         "write_mesh",
     ),
     "grading": (
-        "EQUAL_LENGTH_TOL",
         "Layout",
         "divide_into_columns",
         "divide_into_rows",

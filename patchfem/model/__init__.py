@@ -7,40 +7,18 @@ and drives; `files` checks the files that a scene names.
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "earlier_wear": (
-        "GAP_DIFFERENCE_FRACTION",
-        "LOADING_KEYS",
-        "interpolate_nodes",
-    ),
-    "files": ("find_file_faults",),
-    "law": (
-        "InterfaceLaw",
-        "make_bond_parameters",
-    ),
+    "law": ("make_bond_parameters",),
     "model": (
         "Model",
         "build",
         "build_without_sweep",
         "write_resolved",
     ),
-    "peaks": ("read_spectral_moments",),
     "pieces": (
         "extend_grid",
-        "find_rounded_edges",
-        "make_elastic_layers",
         "make_piece_meshes",
     ),
-    "profile": ("find_sample_spacing",),
-    "rig": ("MAX_COMPUTED_DISPLACEMENT",),
-    "similar_models": (
-        "SimilarModels",
-        "collect_columns",
-        "select_models",
-    ),
+    "similar_models": ("SimilarModels",),
     "slide": ("SlidePath",),
-    "source": ("locate_errors",),
-    "structure": (
-        "compute_named_motions",
-        "compute_sticking_stiffness",
-    ),
+    "structure": ("compute_named_motions",),
 }

@@ -1,6 +1,6 @@
 """Sweeps over many cases of one mode and one contact point, by steps that end at the events of the law.
 
-1. `laws`                 numbers and first memory of the laws
+1. `laws`                 numbers of the laws
 2. `smooth_laws_kernels`  force of each smooth law at the end of a step
 3. `case_rows`, `case_observers_kernels`, `linear_cases_kernels`, `smooth_cases_kernels`, `case_march_kernels`, `cases`
    cases with their measures, for laws that are linear between events and for smooth ones
@@ -9,16 +9,4 @@ A law is a number in `law_rows.Law`, a row of `laws.POINT_LAWS` and branches in 
 """
 
 # Names that other folders use, by module.
-PUBLIC = {
-    "case_rows": (
-        "MAX_STEPS",
-        "MAX_STEP_PHASE",
-        "SAME_CASE_CYCLE",
-        "SAME_SMOOTH_CYCLE",
-        "WINDOW_STEPS",
-        "Cases",
-        "Number",
-    ),
-    "cases": ("CaseMarch", "is_linear_between_events", "list_parameters", "march_cases"),
-    "laws": ("N_NUMBERS", "POINT_LAWS", "list_point_law"),
-}
+PUBLIC = {}

@@ -95,9 +95,8 @@ def march_cases(steps, parameters, laws, nows, seens, histories, loops):
         same = SAME_CASE_CYCLE if is_linear else SAME_SMOOTH_CYCLE / float(steps) ** 3
 
         # State at the start
-        point = linear.make_point(case, law.numbers)
-        coarse = linear.make_block(case, point, float(steps), 1.0)
-        fine = linear.make_block(case, point, float(steps), WINDOW_STEPS)
+        coarse = linear.make_block(case, law, float(steps), 1.0)
+        fine = linear.make_block(case, law, float(steps), WINDOW_STEPS)
         body = smooth.make_body(case, law, float(steps))
         now[Now.SLIDE] = case[Number.SLIDE]
         now[Now.VELOCITY] = case[Number.VELOCITY]
@@ -155,5 +154,5 @@ def march_cases(steps, parameters, laws, nows, seens, histories, loops):
         if n_pieces == MAX_PIECES:
             seen[Seen.SAMPLED] = inf  # the work check fails, as the motion is not known
         now[Now.ELASTIC] = law.memory[Memory.ENERGY]
-        if is_linear and point.stiffness > 0:
-            now[Now.ELASTIC] = 0.5 * now[Now.FORCE] ** 2 / point.stiffness
+        if is_linear and coarse.point.stiffness > 0:
+            now[Now.ELASTIC] = 0.5 * now[Now.FORCE] ** 2 / coarse.point.stiffness

@@ -10,15 +10,23 @@ the velocity changes its sign, or where the acceleration jumps.
 from math import cos, nan, pi, sin
 from typing import NamedTuple
 
-from ..compiled.flags_kernels import NJIT_KERNEL
+import numpy as np
+
+from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from .case_rows import Loop, Now, Number, Seen
+from .law_rows import Law
+from .smooth_laws_kernels import Branch, PointLaw, Step, find_force, find_share
 
 N_READ = 2  # measured cycles of a motion that repeats
 STEP_ROUND_OFF = 1e-9  # remainder of a cycle relative to a step that belongs to the step
-N_PARABOLAS = 2  # further parabolas for an extreme of force or acceleration, each four times as narrow as the last
+N_PARABOLAS = 3  # further parabolas for an extreme of force or acceleration, each four times as narrow as the last
 SAME_SLIDE = 1e-12  # relative difference of slides that is round-off
 STICK_SHARE = 0.5  # irreversible part of the motion from which a point slips
+MAX_LEVEL_STEPS = (
+    12  # steps of the Illinois method for the instant at which slip begins, ends or turns
+)
+LEVEL_TOLERANCE = 1e-4  # tolerance of this instant relative to the piece
 
 
 class Instant(NamedTuple):
@@ -53,6 +61,19 @@ class Piece(NamedTuple):
     duration: float
     work: float
     end_force: float
+
+
+class Motion(NamedTuple):
+    """Motion of a case in a piece.
+
+    - case (12,): numbers of the case, in the order of `case_rows.Number`
+    - law: numbers of its law, and its memory at the start of the piece
+    - branch: curve of the law in the piece
+    """
+
+    case: np.ndarray
+    law: PointLaw
+    branch: Branch
 
 
 class Vertex(NamedTuple):
@@ -109,6 +130,146 @@ def find_vertex(before, middle, after):
     if abs(tilt) >= 2 * abs(bend):
         return Vertex(False, 0.0, largest)
     return Vertex(True, -0.5 * tilt / bend, max(largest, abs(middle - tilt * tilt / (8 * bend))))
+
+
+@njit(**NJIT_KERNEL)
+def make_instant(sine, cosine, q, v, force, slip, case):
+    """Return the `Instant` of a case by its equation of motion.
+
+    Parameters
+    ----------
+    sine, cosine : float
+        Of the phase of the drive.
+    q, v, force, slip : float
+        Slide [m], velocity [m/s], friction force [N] and irreversible slide [m].
+    case : (12,) array
+        Numbers of the case, in the order of `case_rows.Number`.
+    """
+    a = case[Number.DRIVE] * sine - case[Number.DAMPING] * v - case[Number.STIFFNESS] * q
+    return Instant(sine, cosine, q, v, a - case[Number.MOBILITY] * force, force, slip)
+
+
+@njit(**NJIT_CALL)
+def probe(piece, part, motion):
+    """Return the `Instant` within a piece, whose slip is not known.
+
+    Slide and velocity are those of the polynomial of order 5, and force and acceleration those that follow from them.
+
+    Parameters
+    ----------
+    piece : Piece
+    part : float
+        Time since the start relative to the duration.
+    motion : Motion
+    """
+    first = piece.first
+    last = piece.last
+    dt = piece.duration
+    law = motion.law
+
+    # Changes of slide, velocity and acceleration beyond those at constant acceleration, as displacements [m]
+    velocity = dt * first.velocity
+    acceleration = dt * dt * first.acceleration
+    change = last.slide - first.slide
+    slide_change = change - velocity - 0.5 * acceleration
+    velocity_change = dt * last.velocity - velocity - acceleration
+    half_change = 0.5 * (dt * dt * last.acceleration - acceleration)
+    cubic = 10 * slide_change - 4 * velocity_change + half_change
+    quartic = 7 * velocity_change - 15 * slide_change - 2 * half_change
+    quintic = 6 * slide_change - 3 * velocity_change + half_change
+    bend = part * (cubic + part * (quartic + part * quintic))
+    dq = part * (velocity + part * (0.5 * acceleration + bend))
+    slope = part * (3 * cubic + part * (4 * quartic + part * 5 * quintic))
+    v = (velocity + part * (acceleration + slope)) / dt
+
+    # The force of a law that is linear between events is linear in the slide.
+    if law.numbers[0] <= Law.JENKINS:
+        force = first.force
+        if change != 0:
+            force += (last.force - first.force) * dq / change
+    else:
+        force = find_force(law, Step(dq, part * dt, first.velocity, v), False)
+    sine, cosine = turn_phase(first, motion.case[Number.OMEGA] * part * dt)
+    return make_instant(sine, cosine, first.slide + dq, v, force, 0.0, motion.case)
+
+
+@njit(**NJIT_KERNEL)
+def find_level(level, shares, piece, motion):
+    """Return the fraction of a piece at which the irreversible part of the motion passes a level, by the Illinois method.
+
+    Parameters
+    ----------
+    level : float
+        The level.
+    shares : (float, float)
+        Irreversible part of the motion at both ends of the piece.
+    piece : Piece
+    motion : Motion
+
+    Returns
+    -------
+    float
+        -1 if both ends are on the same side of the level.
+    """
+    below = shares[0] - level
+    above = shares[1] - level
+    if (below > 0) == (above > 0):
+        return -1.0
+    low = 0.0
+    high = 1.0
+    for _ in range(MAX_LEVEL_STEPS):
+        part = high - above * (high - low) / (above - below)
+        at = probe(piece, part, motion)
+        miss = find_share(at, motion.branch, motion.law.numbers) - level
+        if miss * above < 0:
+            low = high
+            below = above
+        else:
+            below *= 0.5
+        high = part
+        above = miss
+        if abs(high - low) <= LEVEL_TOLERANCE or miss == 0:
+            break
+    return high
+
+
+@njit(**NJIT_KERNEL)
+def read_signal(at, weights):
+    """Return the sum of force [N], acceleration of the slide and sine of the drive at an `Instant` by their weights."""
+    return weights[0] * at.force + weights[1] * at.acceleration + weights[2] * at.sine
+
+
+@njit(**NJIT_KERNEL)
+def find_peak(piece, weights, motion):
+    """Return the largest magnitude in a piece of a sum of force, acceleration of the slide and sine of the drive.
+
+    The parabola through the middle shows an extreme between the ends.
+
+    Parameters
+    ----------
+    piece : Piece
+    weights : (float, float, float)
+        Weights of force, acceleration and sine.
+    motion : Motion
+    """
+    before = read_signal(piece.first, weights)
+    after = read_signal(piece.last, weights)
+    peak = max(abs(before), abs(after))
+    half = 0.5
+    centre = half
+    vertex = find_vertex(before, read_signal(probe(piece, centre, motion), weights), after)
+    if not vertex.is_between:
+        return peak
+
+    for _ in range(N_PARABOLAS):
+        centre += half * vertex.offset
+        half *= 0.25
+        centre = min(max(centre, (1 + STEP_ROUND_OFF) * half), 1 - half)
+        before = read_signal(probe(piece, centre - half, motion), weights)
+        middle = read_signal(probe(piece, centre, motion), weights)
+        after = read_signal(probe(piece, centre + half, motion), weights)
+        vertex = find_vertex(before, middle, after)
+    return max(peak, vertex.largest)
 
 
 @njit(**NJIT_KERNEL)
@@ -309,6 +470,48 @@ def observe_stick(first, shares, crossings, turn, seen):
         seen[Seen.SLIP_START_PHASE_COS] += cosine * cosine - sine * sine
         seen[Seen.SLIP_START_PHASE_SIN] += 2 * sine * cosine
     seen[Seen.SHARE] = end
+
+
+@njit(**NJIT_KERNEL)
+def observe_motion(piece, motion, output, seen):
+    """Add a piece of the window to `seen`: its stick, turns of the slip, and extremes of acceleration and force inside.
+
+    Parameters
+    ----------
+    piece : Piece
+    motion : Motion
+    output : float
+        Acceleration of the output per that of the slide, 0 while a rigid point is at rest.
+    seen : (20,) array
+        What was observed, in the order of `case_rows.Seen` (changed in place).
+    """
+    first = piece.first
+    case = motion.case
+    numbers = motion.law.numbers
+    dt = piece.duration
+    if dt == 0:
+        return
+
+    # Stick ends and slip turns where the irreversible part of the motion passes a level.
+    begin = find_share(first, motion.branch, numbers)
+    shares = begin, find_share(piece.last, motion.branch, numbers)
+    low = find_level(-STICK_SHARE, shares, piece, motion)
+    high = find_level(STICK_SHARE, shares, piece, motion)
+    observe_stick(first, shares, (low, high), case[Number.OMEGA] * dt, seen)
+    if begin < 0:
+        # The irreversible slide turns where there is no force, and so no stretch.
+        turn = find_level(0.0, shares, piece, motion)
+        if turn >= 0:
+            slip = probe(piece, turn, motion).slide
+            seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], slip)
+            seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], slip)
+
+    peak = find_peak(piece, (0.0, output, case[Number.BASE]), motion)
+    seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
+    # Forces of other laws have their extremes at the ends of pieces.
+    if numbers[0] == Law.TANH or numbers[0] == Law.LUGRE:
+        peak = find_peak(piece, (1.0, 0.0, 0.0), motion)
+        seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], peak)
 
 
 @njit(**NJIT_KERNEL)

@@ -155,11 +155,10 @@ class Cases(NamedTuple):
     """Cases of one mode and one contact point under a sinusoidal drive.
 
     - parameters (c, 12): see `Number`
-    - numbers (c, k), memory (c, l): numbers of the friction law and its memory at the start, see `smooth_laws_kernels`
+    - numbers (c, k): numbers of the friction law, see `law_rows.LawNumber`
     - reference (c,): stiffness of the first mode at the contact [N/m], 0 if unknown
     """
 
     parameters: np.ndarray
     numbers: np.ndarray
-    memory: np.ndarray
     reference: np.ndarray

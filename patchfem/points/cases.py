@@ -14,7 +14,11 @@ from ..motion_measures import (
     ratio_or_zero,
 )
 from .case_rows import Cases, Loop, Now, Number, Seen
-from .law_rows import Law
+from .law_rows import Law, Masing, Memory
+
+# Nested reversals that parallel sliders remember. A decay by 3 % from one to the next has reached 2e-7 of its start. After
+# decays of 1000 to 5000 reversals, forces of a motion that grows again are wrong by up to 4e-3 of the limit.
+REVERSALS = 512
 
 
 class CaseMarch(NamedTuple):
@@ -84,9 +88,14 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
     loops = np.full((n, 1 + int(columns[Number.WINDOW].max(initial=0)), len(Loop)), np.nan)
+    is_masing = cases.numbers[0, 0] == Law.MASING
+    memory = np.zeros((n, Masing.STACK + 2 * REVERSALS if is_masing else len(Memory)))
+    if is_masing:
+        memory[:, Masing.VIRGIN] = 1.0
     kernels = compiled.load_compiled_module("points.case_march_kernels")
-    law = cases.numbers, cases.memory.copy()
-    kernels.march_cases(steps, cases.parameters, law, states, seen, history, loops)
+    kernels.march_cases(
+        steps, cases.parameters, (cases.numbers, memory), states, seen, history, loops
+    )
     now = states[:, 0]
 
     output = columns[Number.OUTPUT][:, None]

@@ -1,15 +1,11 @@
-"""Numbers and first memory of the laws of contact points, from the laws of `friction`."""
+"""Numbers of the laws of contact points, from the laws of `friction`."""
 
 import numpy as np
 
 from ..core import MIN_LOAD
-from .law_rows import Law, Masing
+from .law_rows import Law
 
 N_NUMBERS = 7  # columns of numbers of a point
-N_MEMORY = 3  # columns of memory of a point, without a stack of reversals
-# Nested reversals that parallel sliders remember. A decay by 3 % from one to the next has reached 2e-7 of its start. After
-# decays of 1000 to 5000 reversals, forces of a motion that grows again are wrong by up to 4e-3 of the limit.
-REVERSALS = 512
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
 # Number of each law, and the attributes of a law of `friction` in the order of its numbers; those with a star are per
 # newton of load
@@ -25,7 +21,7 @@ POINT_LAWS = {
 
 
 def list_point_law(name: str, law, load) -> list[float | np.ndarray]:
-    """Return the numbers of a point under a law, and then its memory at the start.
+    """Return the numbers of a point under a law.
 
     Parameters
     ----------
@@ -43,9 +39,4 @@ def list_point_law(name: str, law, load) -> list[float | np.ndarray]:
         if attribute.endswith("*"):
             number = number * np.maximum(load, MIN_LOAD)
         numbers[column] = np.maximum(number, MIN_LENGTH) if attribute == "length" else number
-
-    if kind != Law.MASING:
-        return numbers + [0.0] * N_MEMORY
-    memory = [0.0] * (Masing.STACK + 2 * REVERSALS)
-    memory[Masing.VIRGIN] = 1.0
-    return numbers + memory
+    return numbers

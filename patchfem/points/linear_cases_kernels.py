@@ -19,19 +19,20 @@ from ..compiled.jit import njit
 from .case_observers_kernels import (
     STEP_ROUND_OFF,
     Instant,
+    Motion,
     Piece,
+    observe_motion,
     observe_piece,
-    observe_stick,
     store_instant,
 )
-from .case_rows import MAX_STEP_PHASE, MAX_STEPS, Now, Number, Seen
+from .case_rows import MAX_STEP_PHASE, MAX_STEPS, Now, Number
 from .law_rows import Law, LawNumber
+from .smooth_laws_kernels import Branch, PointLaw
 
 MAX_ROOT_STEPS = 60  # Newton steps and bisections for an event
 ROOT_TOLERANCE = 1e-13  # error of the instant of an event, relative to the step
 # Steps in a row with an event, after which one has none: a point at its limit whose events are round-off
 MAX_EVENTS = 16
-N_PEAK_STEPS = 6  # steps of the Illinois method for an extreme of the acceleration
 # Time of a slip relative to its step below which it is round-off. The elastic point is then unloaded by this fraction of
 # its limit, so that the slip is not tried again.
 MIN_SLIP_TIME = 1e-9
@@ -105,13 +106,14 @@ class Block(NamedTuple):
     """A case.
 
     - case (12,): numbers of the case, in the order of `case_rows.Number`
-    - point: its law
+    - law, point: its law
     - slip, stick: motion in both regimes
     - step: longest step [s]
     - slip_step, stick_step: response over it in both regimes
     """
 
     case: np.ndarray
+    law: PointLaw
     point: Point
     slip: Regime
     stick: Regime
@@ -200,26 +202,27 @@ def make_point(case, numbers):
 
 
 @njit(**NJIT_KERNEL)
-def make_block(case, point, steps, refinement):
+def make_block(case, law, steps, refinement):
     """Return the `Block` of a case.
 
     Parameters
     ----------
     case : (12,) array
         Numbers of the case, in the order of `case_rows.Number`.
-    point : Point
+    law : PointLaw
     steps : float
         Fewest steps per cycle. More of them resolve the vibration of a sticking point.
     refinement : float
         Factor of the number of steps.
     """
+    point = make_point(case, law.numbers)
     slip = make_regime(case, 0.0)
     stick = make_regime(case, point.mobility * point.stiffness)
     period = 2 * pi / slip.omega
     needed = max(steps, period * stick.frequency / MAX_STEP_PHASE)
     step = period / min(needed, MAX_STEPS) / refinement
     slip_step = make_free_step(slip, step)
-    return Block(case, point, slip, stick, step, slip_step, make_free_step(stick, step))
+    return Block(case, law, point, slip, stick, step, slip_step, make_free_step(stick, step))
 
 
 @njit(**NJIT_KERNEL)
@@ -512,64 +515,6 @@ def start(block, now):
 
 
 @njit(**NJIT_KERNEL)
-def find_output(regime, state, weights):
-    """Return the acceleration of the output in a state [m s-2], and its rate [m s-3].
-
-    Parameters
-    ----------
-    regime : Regime
-    state : State
-    weights : (float, float)
-        Weights of the acceleration of the slide, and of the sine of the drive [m s-2].
-    """
-    output, base = weights
-    value = output * state.acceleration + base * state.sine
-    return value, output * find_jerk(regime, state) + base * regime.omega * state.cosine
-
-
-@njit(**NJIT_KERNEL)
-def find_peak(regime, rest, start, end, dt, weights):
-    """Return the largest magnitude of the acceleration of the output in a step [m s-2].
-
-    Parameters
-    ----------
-    regime : Regime
-    rest : float
-        Slide at which the constant forces are in balance [m].
-    start, end : State
-        Ends of the step.
-    dt : float
-        Duration [s].
-    weights : (float, float)
-        Weights of the acceleration of the slide, and of the sine of the drive [m s-2].
-    """
-    begin_value, begin_rate = find_output(regime, start, weights)
-    end_value, end_rate = find_output(regime, end, weights)
-    peak = max(abs(begin_value), abs(end_value))
-    if begin_rate * end_rate >= 0:
-        return peak
-
-    # Illinois method for the zero of the rate; the error of the extreme is of second order in that of its instant.
-    low = 0.0
-    high = dt
-    for _ in range(N_PEAK_STEPS):
-        time = high - end_rate * (high - low) / (end_rate - begin_rate)
-        at = move(regime, rest, start, make_free_step(regime, time))
-        value, rate = find_output(regime, at, weights)
-        peak = max(peak, abs(value))
-        if rate * end_rate < 0:
-            low = high
-            begin_rate = end_rate
-        else:
-            begin_rate *= 0.5
-        high = time
-        end_rate = rate
-        if rate == 0:
-            break
-    return peak
-
-
-@njit(**NJIT_KERNEL)
 def advance(block, left, n_events, observes, now, seen):
     """Advance a case by a step, or up to the event in it, and return the `Piece`.
 
@@ -641,11 +586,8 @@ def advance(block, left, n_events, observes, now, seen):
     if observes:
         case = block.case
         observe_piece(piece, case, seen)
-        share = 0.0 if sticks else 1.0
-        observe_stick(first, (share, share), (0.0, 0.0), regime.omega * dt, seen)
-        weights = 0.0 if is_held else case[Number.OUTPUT], case[Number.BASE]
-        peak = find_peak(regime, rest, begin, end, dt, weights)
-        seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
+        motion = Motion(case, block.law, Branch(q, contact.direction, 1.0, inf))
+        observe_motion(piece, motion, 0.0 if is_held else case[Number.OUTPUT], seen)
     store_instant(last, now)
     now[Now.DIRECTION] = after.direction
     if after.direction == 0:

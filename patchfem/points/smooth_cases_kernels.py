@@ -16,17 +16,15 @@ from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..friction.laws.lugre_kernels import LuGreNumber
 from .case_observers_kernels import (
-    N_PARABOLAS,
     STEP_ROUND_OFF,
-    STICK_SHARE,
-    Instant,
+    Motion,
     Piece,
-    find_vertex,
+    make_instant,
+    observe_motion,
     observe_piece,
-    observe_stick,
     store_instant,
 )
-from .case_rows import Now, Number, Seen
+from .case_rows import Now, Number
 from .law_rows import Law, LawNumber, Memory
 from .smooth_laws_kernels import (
     PointLaw,
@@ -34,16 +32,11 @@ from .smooth_laws_kernels import (
     find_branch,
     find_first_tangent,
     find_force,
-    find_share,
 )
 
 MAX_END_STEPS = 8  # Newton steps for the instant of a turn, or of a corner of the law
 # Velocity at a turn relative to its change in the step, or path to a corner relative to the whole path to it
 END_TOLERANCE = 1e-6
-MAX_LEVEL_STEPS = (
-    12  # steps of the Illinois method for the instant at which slip begins, ends or turns
-)
-LEVEL_TOLERANCE = 1e-4  # tolerance of this instant relative to the step
 # Steps per cycle at which the shortest step is a radian of the vibration above a stiff law, or the time of its relaxation
 REFERENCE_STEPS = 16.0
 FLAT_SPEED = (
@@ -102,23 +95,6 @@ def make_body(case, law, steps):
     step = 2 * half / case[Number.OMEGA]
     grade = REFERENCE_STEPS / steps
     return Body(case, law, grade, step, (cos(half), sin(half)))
-
-
-@njit(**NJIT_KERNEL)
-def make_instant(sine, cosine, q, v, force, slip, case):
-    """Return the `Instant` of a case by its equation of motion.
-
-    Parameters
-    ----------
-    sine, cosine : float
-        Of the phase of the drive.
-    q, v, force, slip : float
-        Slide [m], velocity [m/s], friction force [N] and irreversible slide [m].
-    case : (12,) array
-        Numbers of the case, in the order of `case_rows.Number`.
-    """
-    a = case[Number.DRIVE] * sine - case[Number.DAMPING] * v - case[Number.STIFFNESS] * q
-    return Instant(sine, cosine, q, v, a - case[Number.MOBILITY] * force, force, slip)
 
 
 @njit(**NJIT_CALL)
@@ -231,8 +207,8 @@ def find_longest_step(first, tangent, body):
     if law != Law.TANH:
         dt = grade / sqrt(mobility * tangent + case[Number.STIFFNESS] + case[Number.OMEGA] ** 2)
         if law != Law.LUGRE:
-            # The force of a law of the path changes by a part of its range, which is twice the limit.
-            path = 2 * grade * numbers[LawNumber.LIMIT] / tangent
+            # The force of a law of the path changes by a part of its limit.
+            path = grade * numbers[LawNumber.LIMIT] / tangent
             root = sqrt(first.velocity**2 + 2 * path * abs(first.acceleration))
             return min(dt, 2 * path / (abs(first.velocity) + root))
         speed = numbers[LuGreNumber.SPEED]
@@ -289,165 +265,6 @@ def start(body, now):
     now[Now.TANGENT] = find_first_tangent(law.numbers)
 
 
-@njit(**NJIT_CALL)
-def probe(first, dt, body):
-    """Return the `Instant` within a step, whose slip is not known.
-
-    Parameters
-    ----------
-    first : Instant
-        Start of the step.
-    dt : float
-        Time since the start [s].
-    body : Body
-        Its memory is that at the start of the step.
-    """
-    return finish_step(first, take_step(first, dt, body), dt, False, body)
-
-
-@njit(**NJIT_KERNEL)
-def read_signal(at, of_force, case):
-    """Return the force [N] at an `Instant`, or the acceleration of the output [m s-2].
-
-    Parameters
-    ----------
-    at : Instant
-    of_force : bool
-        Whether the force is meant.
-    case : (12,) array
-        Numbers of the case, in the order of `case_rows.Number`.
-    """
-    if of_force:
-        return at.force
-    return case[Number.OUTPUT] * at.acceleration + case[Number.BASE] * at.sine
-
-
-@njit(**NJIT_KERNEL)
-def find_level(level, shares, first, dt, branch, body):
-    """Return the fraction of a step at which the irreversible part of the motion passes a level, by the Illinois method.
-
-    Parameters
-    ----------
-    level : float
-        The level.
-    shares : (float, float)
-        Irreversible part of the motion at both ends of the step.
-    first : Instant
-        Start of the step.
-    dt : float
-        Duration [s].
-    branch : Branch
-    body : Body
-        Its memory is that at the start of the step.
-
-    Returns
-    -------
-    float
-        -1 if both ends are on the same side of the level.
-    """
-    below = shares[0] - level
-    above = shares[1] - level
-    if (below > 0) == (above > 0):
-        return -1.0
-    low = 0.0
-    high = 1.0
-    for _ in range(MAX_LEVEL_STEPS):
-        part = high - above * (high - low) / (above - below)
-        miss = find_share(probe(first, part * dt, body), branch, body.law.numbers) - level
-        if miss * above < 0:
-            low = high
-            below = above
-        else:
-            below *= 0.5
-        high = part
-        above = miss
-        if abs(high - low) <= LEVEL_TOLERANCE or miss == 0:
-            break
-    return high
-
-
-@njit(**NJIT_KERNEL)
-def find_peak(first, ends, dt, of_force, body):
-    """Return the largest magnitude in a step of the force [N], or of the acceleration of the output [m s-2].
-
-    The parabola through the middle shows an extreme between the ends.
-
-    Parameters
-    ----------
-    first : Instant
-        Start of the step.
-    ends : (Instant, Instant)
-        Middle and end of the step.
-    dt : float
-        Duration [s].
-    of_force : bool
-        Whether the force is meant.
-    body : Body
-        Its memory is that at the start of the step.
-    """
-    case = body.case
-    before = read_signal(first, of_force, case)
-    after = read_signal(ends[1], of_force, case)
-    peak = max(abs(before), abs(after))
-    vertex = find_vertex(before, read_signal(ends[0], of_force, case), after)
-    if not vertex.is_between:
-        return peak
-
-    half = 0.5 * dt
-    centre = half
-    for _ in range(N_PARABOLAS):
-        centre += half * vertex.offset
-        half *= 0.25
-        centre = min(max(centre, (1 + STEP_ROUND_OFF) * half), dt - half)
-        before = read_signal(probe(first, centre - half, body), of_force, case)
-        middle = read_signal(probe(first, centre, body), of_force, case)
-        after = read_signal(probe(first, centre + half, body), of_force, case)
-        vertex = find_vertex(before, middle, after)
-    return max(peak, vertex.largest)
-
-
-@njit(**NJIT_KERNEL)
-def observe_step(first, dt, branch, body, seen):
-    """Add a step of the window to `seen`.
-
-    Parameters
-    ----------
-    first : Instant
-        Start of the step.
-    dt : float
-        Duration [s].
-    branch : Branch
-    body : Body
-        Its memory is that at the start of the step.
-    seen : (20,) array
-        What was observed, in the order of `case_rows.Seen` (changed in place).
-    """
-    numbers = body.law.numbers
-    middle = probe(first, 0.5 * dt, body)
-    end = probe(first, dt, body)
-
-    # Stick ends and slip turns where the irreversible part of the motion passes a level.
-    begin = find_share(first, branch, numbers)
-    shares = begin, find_share(end, branch, numbers)
-    low = find_level(-STICK_SHARE, shares, first, dt, branch, body)
-    high = find_level(STICK_SHARE, shares, first, dt, branch, body)
-    observe_stick(first, shares, (low, high), body.case[Number.OMEGA] * dt, seen)
-    if begin < 0:
-        # The irreversible slide turns where there is no force, and so no stretch.
-        turn = find_level(0.0, shares, first, dt, branch, body)
-        if turn >= 0:
-            slip = probe(first, turn * dt, body).slide
-            seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], slip)
-            seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], slip)
-
-    peak = find_peak(first, (middle, end), dt, False, body)
-    seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
-    # Forces of other laws have their extremes at turns.
-    if numbers[0] == Law.TANH or numbers[0] == Law.LUGRE:
-        peak = find_peak(first, (middle, end), dt, True, body)
-        seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], peak)
-
-
 @njit(**NJIT_KERNEL)
 def advance(body, left, observes, now, seen):
     """Advance a case by a step, or up to the turn or the corner of the law in it, and return the `Piece`.
@@ -489,7 +306,11 @@ def advance(body, left, observes, now, seen):
     if turns or passes:
         dt, taken = locate_end(first, taken, dt, branch.path, turns, body)
     if observes:
-        observe_step(first, dt, branch, body, seen)
+        # Within the step the law follows from its memory at the start.
+        last = finish_step(first, taken, dt, False, body)
+        piece = Piece(first, last, dt, taken.work, last.force)
+        motion = Motion(body.case, body.law, branch)
+        observe_motion(piece, motion, body.case[Number.OUTPUT], seen)
     last = finish_step(first, taken, dt, True, body)
     piece = Piece(first, last, dt, taken.work, last.force)
     if observes:

@@ -55,7 +55,7 @@ class Branch(NamedTuple):
     """Curve of the force between two turns.
 
     - start: slide at the start of the step [m]
-    - direction: of the motion, 1 or -1
+    - direction: of the motion, 1 or -1, or 0 during stick of a law that is linear between events
     - length, path: slide from the start of the branch, and from that of the step, to the corner of the curve, at which all
       sliders slip or the force of BOUC_WEN is 0 [m]; the path is inf without such a corner
     """
@@ -365,6 +365,8 @@ def find_share(at, branch, numbers):
     law = numbers[0]
     if law == Law.TANH:
         return 1.0
+    if law <= Law.JENKINS:
+        return abs(branch.direction)
 
     # The sliders that slip carry B - x B' of the limit, with the force B of first loading at the displacement x.
     if law == Law.MASING:

@@ -299,12 +299,12 @@ def _advise_steps(missed: Missed) -> Advice | None:
 def _advise_motion_mesh(missed: Missed) -> Advice | None:
     """Return the advice to refine the meshes on which the motion depends; None if there are none.
 
-    These are the meshes of the interfaces in which some nodes stick while others slip, or that of the only patch.
+    These are the meshes of the interfaces whose motion follows from the pressure at each place, or that of the only patch.
     """
     solved = [
         (face.model.patch, face.unworn or face.patches)
         for face in missed.faces
-        if face.partial_slip or missed.model.patch is not None
+        if face.depends_on_pressure or missed.model.patch is not None
     ]
     return _advise_mesh(missed, solved) if solved else None
 

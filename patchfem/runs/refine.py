@@ -4,14 +4,14 @@ In: a function that solves a problem with a resolution, and one that judges the 
 the resolution along the axis that causes the errors of a measure (`find_refinable_axis`): the meshes of the patches or the
 steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_refined`). A run that would not meet its tolerance within
 accuracy.max_seconds, or whose next mesh would exceed accuracy.max_memory, is not repeated; its result names the axis and the
-time or memory that would be needed. The meshes of a single patch (`patch.mesh_levels`), curves, backbones and fits have
-loops of their own.
+time or memory that would be needed. The meshes of a patch (`patch.mesh_levels`) and of a group of patches
+(`patch.case_meshes`) are refined by the same loop. Curves, backbones and fits have loops of their own.
 """
 
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from math import ceil, inf, log, log2
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -91,15 +91,8 @@ class RunLimit(NamedTuple):
     bytes: float = DEFAULT_MAX_BYTES
 
 
-class Refined(NamedTuple, Generic[Solution]):
-    """Last solution of a refinement.
-
-    - solution: the solution.
-    - shortage: Shortage if accuracy.max_seconds or accuracy.max_memory ended the refinement, else None.
-    """
-
-    solution: Solution
-    shortage: Shortage | None = None
+# of meshes, which have a largest predicted time of their own
+NO_LIMIT = RunLimit(inf, 0.0, bytes=inf)
 
 
 class WorstMeasure(NamedTuple):
@@ -121,8 +114,10 @@ def refine(
     judge: Callable[[Solution, list[float]], Verdict],
     limit: RunLimit,
     say: Callable[[str], None] | None = None,
-) -> Refined[Solution]:
+) -> tuple[Solution, Shortage | None]:
     """Solve a problem with finer and finer resolutions, and return the last solution.
+
+    The second value is a Shortage if accuracy.max_seconds or accuracy.max_memory ended the refinement, else None.
 
     Parameters
     ----------
@@ -154,13 +149,13 @@ def refine(
         if resolution is not None:
             if verdict.bytes > limit.bytes:
                 shortage = Shortage(verdict.axis, verdict.bytes, "accuracy.max_memory")
-                return Refined(solution, shortage)
+                return solution, shortage
             spent = limit.clock() - limit.begin
             if spent + verdict.cost_ratio * verdict.seconds > limit.seconds:
-                return Refined(solution, Shortage(verdict.axis, spent + verdict.predict_seconds()))
+                return solution, Shortage(verdict.axis, spent + verdict.predict_seconds())
             if say is not None and verdict.reason:
                 say(verdict.reason)
-    return Refined(solution)
+    return solution, None
 
 
 def split_error(measure: Measure, name: str) -> Values:

@@ -13,12 +13,8 @@ first.
 # Names that other folders use, by module
 PUBLIC = {
     "edge_springs": ("add_edge_springs",),
-    "fields": ("compute_element_fields",),
     "mesh_correction": ("spread_elements",),
     "shear_modes": (
-        "JenkinsSet",
-        "N_SHEAR_MODES",
-        "comparison_mode_count",
         "find_sufficient_modes",
         "make_jenkins_set",
     ),

@@ -22,15 +22,9 @@ PUBLIC = {
         "clean",
         "resample_evenly",
     ),
-    "quantity": (
-        "CONFIDENCE_LEVEL",
-        "Quantity",
-    ),
     "roughness.filter": ("mean_line",),
-    "roughness.form": ("parse_form_option",),
     "roughness.peaks": (
         "Moments",
-        "DECAY_LENGTH_OVER_RMS_HEIGHT",
         "gaussian_peaks",
         "trace_moments",
     ),
@@ -38,9 +32,5 @@ PUBLIC = {
         "fitting_cutoff",
         "make_report",
     ),
-    "spectrum": (
-        "WAVE_BAND",
-        "MIN_ELEMENTS_PER_WAVE",
-        "describe_lost_waves",
-    ),
+    "spectrum": ("describe_lost_waves",),
 }

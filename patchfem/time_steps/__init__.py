@@ -30,18 +30,7 @@ change of ENERGY.
 
 # Names that other folders use, by module
 PUBLIC = {
-    "checkpoint": ("CheckpointFiles", "store_checkpoints"),
-    "contacts": ("BondSum", "Contact", "LowerPressure", "PointSet"),
-    "laws": (
-        "STIFF_LAWS",
-        "PointLaw",
-        "make_cells",
-        "make_cubic",
-        "make_elements",
-        "make_interlocking",
-        "make_point_law",
-    ),
-    "slides": ("BLOCK", "follow"),
+    "slides": ("follow",),
     "systems": ("find_stiffness",),
-    "time_march": ("March", "Motion", "Snapshot", "load_kernels", "march"),
+    "time_march": ("March", "march"),
 }

@@ -70,9 +70,6 @@ MAX_LOAD_ITERATIONS = (
 )
 MAX_CUTS = 8  # trials of a line search
 CUT = 0.3  # factor of a step by a trial of the line search
-MAX_OVERSHOOT = (
-    0.5  # slope beyond the minimum of a potential, relative to that at the start of a line search
-)
 MAX_STALLS = 4  # iterations that do not halve the smallest residual, after which a step ends
 # Largest residual of such a step relative to RESIDUAL, and that of lists, whose means have quadrature errors
 STALLED = 1e3
@@ -602,8 +599,8 @@ def solve_forces(system, level, step):
             descent = -find_potential_slope(system, level)
         store_base(system)
 
-        # The line search accepts a step that decreases the largest residual, or one near the minimum of the potential of
-        # forces that bend at many places.
+        # The line search accepts a step that decreases the largest residual, or one not beyond the minimum of the potential
+        # of forces that bend at many places: the potential falls, so that no steps repeat.
         fraction = 1.0
         before = residual
         for _ in range(LIST_CUTS if has_potential else MAX_CUTS):
@@ -616,7 +613,7 @@ def solve_forces(system, level, step):
                 break
             if has_potential:
                 slope = find_potential_slope(system, level)
-                if descent <= 0 or slope <= MAX_OVERSHOOT * descent:
+                if descent <= 0 or slope <= 0:
                     break
                 fraction *= max(0.1, descent / (slope + descent))  # at least a tenth per trial
             elif residual < before:

@@ -10,14 +10,8 @@ Read `depth` first.
 # Names that other folders use, by module
 PUBLIC = {
     "depth": ("wear_rates",),
-    "between_runs": (
-        "PatchState",
-        "measure_wear",
-    ),
     "jumps": (
         "WearProblem",
-        "WearState",
-        "replay_jumps",
         "make_initial_wear_state",
         "take_jump",
     ),

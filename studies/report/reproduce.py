@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from importlib import import_module
-from math import log, pi
+from math import isnan, log, nan, pi
 from os.path import relpath
 from pathlib import Path
 from typing import NamedTuple
@@ -96,13 +96,14 @@ def compare(place: str, what: str, printed: tuple, found: tuple, study: str) -> 
     number, unit = printed
     ratio = value / number
     agrees = ratio > 0 and abs(log(ratio)) <= log(1 + REPEATED_SCATTER)
+    bar = "not estimated" if isnan(error) else f"{error:.1g}"
     verdict = "agrees" if agrees else f"{ratio:.2g} times"
     return Row(
         place,
         what,
         f"{number:g} {unit}".rstrip(),
         f"{value:.4g} {unit}".rstrip(),
-        f"{error:.1g}",
+        bar,
         study,
         verdict,
     )
@@ -187,11 +188,59 @@ def make_figure(part: str, folder: Path | None) -> Iterator[Row]:
     name, figures = FIGURES[part]
     module = import_module(name)
     file = Path(module.__file__)
-    module.main(path=None if folder is None else find_picture(file, folder))
+    found = module.main(path=None if folder is None else find_picture(file, folder))
     verdict, _, reason = module.VERDICT.partition(": ")
     answer = reason or read_answer(module.__doc__)
     study = file.relative_to(STUDIES).as_posix()
     yield Row(figures, "figure", "curves", answer, "", study, verdict)
+    for place, what, printed, pair in FIGURE_NUMBERS.get(part, lambda _: [])(found):
+        yield compare(place, what, printed, pair, study)
+
+
+def list_release(found: tuple) -> Iterator[tuple]:
+    """Return the times of rest of the released blocks, beside the 11 units of the report."""
+    for row in found[0]:
+        what = f"time of rest, natural frequency {row.omega:.3g}, k x0/F {row.ratio:g}"
+        yield "3.C.1, p. 13", what, (11, ""), (row.stop, row.error)
+
+
+def list_free_mode(found: tuple) -> Iterator[tuple]:
+    """Return the mode fitted to a simulated modal test; the error is the rms misfit, of half the bandwidth."""
+    frequency, damping, misfit = found[2]
+    yield (
+        "4.B, p. 16",
+        "frequency of the axial mode",
+        (143, "Hz"),
+        (frequency, misfit * damping * frequency),
+    )
+    yield "4.B, p. 16", "its damping ratio", (0.003, ""), (damping, misfit * damping)
+
+
+def list_loaded_modes(found: list) -> Iterator[tuple]:
+    """Return the frequencies of the modes with friction that are critically damped within a third."""
+    for row in found:
+        if 0.67 < row.damping < 1.5:
+            what = f"{row.model} at {row.level:g} g rms, damping ratio {row.damping:.2f}"
+            yield "4.B, p. 16", what, (148, "Hz"), (row.frequency, nan)
+
+
+def list_first_slips(found: list) -> Iterator[tuple]:
+    """Return the friction under which mass 2 moves, with the largest violation of the law in accepted steps as error."""
+    for row in found[0]:
+        yield (
+            "3.C.2, p. 14",
+            f"friction [P0] as mass 2 moves: {row.name}",
+            (3, ""),
+            (row.force, row.worst),
+        )
+
+
+FIGURE_NUMBERS = {
+    "figure-15": list_release,
+    "figures-16-22": list_first_slips,
+    "figure-26": list_free_mode,
+    "figure-27": list_loaded_modes,
+}
 
 
 def make_conclusions() -> Iterator[Row]:

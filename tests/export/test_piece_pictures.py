@@ -9,7 +9,7 @@ from exported import write_small_series
 from PIL import Image
 
 from patchfem.export.fields.film import contact_window, make_stress_panels
-from patchfem.export.fields.vtkhdf import read_frames
+from patchfem.export.fields.vtkhdf import Block, Frames, read_frames
 from patchfem.export.pieces import draw_pieces, magnify_pieces
 
 WHOLE = (-1.0, 1.0, -1.0, 1.0)  # [m], a window that contains all pieces
@@ -123,3 +123,12 @@ def test_labels_of_stress_film_differ_after_long_wear(tmp_path):
     write_small_series(tmp_path / "out", times=1e6 + 1e-3 * np.arange(3))
     (panel,) = make_stress_panels(tmp_path / "out" / "fields.vtkhdf")
     assert [curve.name for curve in panel.curves] == ["0 ms", "1 ms", "2 ms"]
+
+
+def test_exact_window_follows_the_contact_of_a_graded_mesh():
+    """The window has eight elements at a small contact, although elements far from it are long."""
+    x = np.array([-10, -1, -0.1, 0, 0.1, 1, 10]) * 1e-3
+    pressure = np.eye(7)[3:4]
+    line = Block(x[:, None], np.zeros((0, 2)), {"normal_stress": pressure}, {})
+    window = contact_window(Frames("", np.zeros(1), {"interface": line}))
+    assert window == pytest.approx((-0.4e-3, 0.4e-3, -0.24e-3, 0.24e-3))

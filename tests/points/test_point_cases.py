@@ -40,7 +40,7 @@ def make(name, accelerations=(DRIVE.acceleration,), ratio=1.0, cycles=200, **cha
     ]
     rows = np.column_stack(np.broadcast_arrays(*columns))
     n = len(case_rows.Number)
-    *arrays, reference = np.split(rows, [n, n + laws.N_NUMBERS, -1], axis=1)
+    *arrays, reference = np.split(rows, [n, -1], axis=1)
     return case_rows.Cases(*map(np.ascontiguousarray, arrays), reference[:, 0])
 
 

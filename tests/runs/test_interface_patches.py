@@ -221,6 +221,17 @@ def test_always_rigid_patch_moves_as_point_with_warning():
     )
 
 
+def test_always_law_that_averages_the_pressure_has_the_error_of_the_mesh():
+    """The friction limit of a rigid patch whose law averages the pressure depends on its mesh, and so do its errors."""
+    rigid = SINGLE_INTERFACE.replace("[structure.interface.contact.shear]\n", "")
+    scene = rigid.replace(LAW, 'law = "convolution"\nstatic = 0.3\nbond_length = "1 mm"\n')
+    rough, fine = (
+        pf.run(scene, **{"structure.interface[1].contact.element_size": size}).measures["loop_area"]
+        for size in ("0.4 mm", "0.1 mm")
+    )
+    assert 0 < abs(rough.value - fine.value) <= rough.error + fine.error
+
+
 def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, chain_result):
     """The dataset, the report, the exports and the summary contain every interface."""
     monkeypatch.chdir(tmp_path)

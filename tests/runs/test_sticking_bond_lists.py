@@ -69,15 +69,7 @@ tolerance = 0.01
 @pytest.mark.share(0)
 @pytest.mark.parametrize(
     "text",
-    [
-        pytest.param(
-            RIG.format(reading="report", push=5.739),
-            marks=pytest.mark.xfail(
-                reason="strokes of .005 bond lengths are not joined", strict=True
-            ),
-        ),
-        MASSES,
-    ],
+    [RIG.format(reading="report", push=5.739), MASSES],
     ids=["mode", "masses"],
 )
 def test_always_list_of_stuck_block_is_bounded(text):

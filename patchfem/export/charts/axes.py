@@ -1,4 +1,4 @@
-"""Panels as matplotlib Axes, for pictures and for `plot` in Python."""
+"""Panels as matplotlib Axes, for pictures and for `plot` in Python, with the traces that a page has."""
 
 import io
 from functools import partial
@@ -10,13 +10,18 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
 from ..answer import Answer
 from ..rows import CHARTS
-from .panels import Curve, Panel, make_panels
-from .plotly import CURVE_COLOURS, ERROR_BAND_OPACITY, STATE_COLOURS
+from .panels import Panel, make_panels
+from .plotly import ERROR_BAND_OPACITY, Figure, make_traces
 
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 # Number of charts of a picture, 1 for all other kinds of answers. A backbone needs frequency, damping and force.
 N_PICTURE_CHARTS = {"backbone": 3}
 
+# colours of maps; red is positive, as in the scale of plotly.js
+MATPLOTLIB_COLOURS = {"Viridis": "viridis", "RdBu": "RdBu_r"}
+POINTS_PER_PIXEL = (
+    0.8  # widths of lines, so that curves of usual weight have the width of a picture
+)
 MATPLOTLIB_MARKERS = {"circle": "o", "x": "x"}  # marker for each symbol of plotly
 # style of the pictures; two drawings of the same answer are equal files
 MATPLOTLIB_STYLE = {
@@ -40,14 +45,18 @@ PANEL_SIZE_INCHES = (6.4, 4.2)  # width and height
 
 
 def draw_panel(panel: Panel, axes):
-    """Draw a panel on matplotlib Axes and return them; of a menu, the first choice."""
+    """Draw the traces of a panel on matplotlib Axes and return them.
+
+    Of a menu the first choice is drawn, and of a film the last frame.
+    """
     if panel.choices:
         return draw_panel(panel.choices[0], axes)
-    if panel.style in ("map", "film"):
-        _draw_map(panel, axes)
-    else:
-        for number, curve in enumerate(panel.curves):
-            _draw_curve(curve, panel.style, CURVE_COLOURS[number % len(CURVE_COLOURS)], axes)
+    traces = make_traces(panel)
+    for trace in traces[-1:] if panel.style == "film" else traces:
+        if "z" in trace:
+            _draw_map(trace, axes)
+        else:
+            _draw_curve(trace, axes)
     for position in panel.marks:
         axes.axvline(position, color="0.5", lw=1, ls=":")
     axes.set(title=panel.title, xlabel=panel.x.label, ylabel=panel.y.label)
@@ -57,60 +66,50 @@ def draw_panel(panel: Panel, axes):
     return axes
 
 
-def _draw_curve(curve: Curve, style: str, colour: str, axes) -> None:
-    """Draw points with error bars, or a line with its band, into matplotlib axes.
-
-    The data are in display units. `style` is that of the panel, and `colour` applies to line, symbols and band.
-    """
-    if style in ("points", "dots") and not curve.is_line:
-        if style == "dots":
-            axes.plot(curve.x, curve.y, color=colour, lw=1)
-
-        # Error bars below the symbols, of which each kind is plotted by itself
-        if curve.low is not None:
-            ends = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
-            axes.errorbar(curve.x, curve.y, ends, fmt="none", ecolor=colour)
-        symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
-        for symbol, marker in MATPLOTLIB_MARKERS.items():
-            points = (values[symbols == symbol] for values in (curve.x, curve.y))
-            label = curve.name if symbol == "circle" else None  # the entry of the legend
-            axes.plot(*points, marker, color=colour, label=label, zorder=3)
+def _draw_curve(trace: Figure, axes) -> None:
+    """Draw the trace of a curve with its error bars, or that of an error band, into matplotlib axes."""
+    x, y = trace["x"], trace["y"]
+    colour = trace.get("fillcolor") or trace["line"]["color"]
+    filling = {"color": colour, "alpha": ERROR_BAND_OPACITY, "lw": 0}
+    if trace.get("fill") == "toself":
+        axes.fill(x, y, **filling)
         return
 
-    # A heavier line lies above the others.
-    options = {
-        "lw": MATPLOTLIB_STYLE["lines.linewidth"] * curve.weight,
-        "zorder": 2 + curve.weight / 10,
-    }
-    axes.plot(curve.x, curve.y, color=colour, label=curve.name, **options)
-    filling = {"color": colour, "alpha": ERROR_BAND_OPACITY, "lw": 0}
-    if curve.low is not None:
-        axes.fill_between(curve.x, curve.low, curve.high, **filling)
-    if style == "area":
-        axes.fill_between(curve.x, curve.y, **filling)
+    has_points = "markers" in trace["mode"]
+    if "lines" in trace["mode"]:
+        width = POINTS_PER_PIXEL * trace["line"]["width"]
+        axes.plot(x, y, color=colour, lw=width, label=None if has_points else trace["name"])
+    if "fill" in trace:
+        axes.fill_between(x, y, **filling)
+    if not has_points:
+        return
+
+    # Error bars below the symbols, of which each kind is plotted by itself
+    if "error_y" in trace:
+        ends = np.nan_to_num([trace["error_y"][part] for part in ("arrayminus", "array")])
+        axes.errorbar(x, y, ends, fmt="none", ecolor=colour)
+    symbols = np.broadcast_to(trace["marker"].get("symbol", "circle"), x.shape)
+    for symbol, marker in MATPLOTLIB_MARKERS.items():
+        points = (values[symbols == symbol] for values in (x, y))
+        label = trace["name"] if symbol == "circle" else None  # the entry of the legend
+        axes.plot(*points, marker, color=colour, label=label, zorder=3)
 
 
-def _draw_map(panel: Panel, axes) -> None:
-    """Draw a map with its colour bar; of a film, the last frame."""
-    from matplotlib.colors import BoundaryNorm, ListedColormap
+def _draw_map(trace: Figure, axes) -> None:
+    """Draw the trace of a map into matplotlib axes, with its colour bar."""
+    from matplotlib.colors import ListedColormap
 
-    curve = panel.curves[-1]
-    options = {"cmap": "viridis"}
-    if curve.meanings:
-        count = len(curve.meanings)
-        edges = np.arange(count + 1) - 0.5
-        options = {
-            "cmap": ListedColormap(STATE_COLOURS[:count]),
-            "norm": BoundaryNorm(edges, count),
-        }
-    elif np.nanmin(curve.y) < 0 < np.nanmax(curve.y):
-        limit = np.nanmax(np.abs(curve.y))
-        # red is positive, as in the scale of plotly.js on the page
-        options = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
-    mesh = axes.pcolormesh(curve.x, curve.rows, curve.y, shading="nearest", **options)
-    bar = axes.figure.colorbar(mesh, label="" if curve.meanings else panel.colour_label)
-    if curve.meanings:
-        bar.set_ticks(range(len(curve.meanings)), labels=curve.meanings)
+    colours = trace["colorscale"]
+    if isinstance(colours, str):
+        colours = MATPLOTLIB_COLOURS[colours]
+    else:  # a colour for each code, at both ends of its range
+        colours = ListedColormap([colour for _, colour in colours[::2]])
+    options = {"cmap": colours, "vmin": trace["zmin"], "vmax": trace["zmax"]}
+    mesh = axes.pcolormesh(trace["x"], trace["y"], trace["z"], shading="nearest", **options)
+    bar = trace["colorbar"]
+    drawn = axes.figure.colorbar(mesh, label=bar.get("title", {}).get("text", ""))
+    if "tickvals" in bar:
+        drawn.set_ticks(bar["tickvals"], labels=bar["ticktext"])
 
 
 def make_figure(panels: list[Panel]):

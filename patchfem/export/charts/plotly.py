@@ -19,6 +19,7 @@ STATE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")
 OVERLAID_CURVE_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))
 ERROR_BAND_OPACITY = 0.18  # opacity of an error band, 1 for the colour of its curve
 FILM_FRAME_MILLISECONDS = 120
+AREA_MARGIN_FRACTION = 0.02  # room beside a filled curve, relative to its length; less is not seen
 # figure of plotly.js, or a part of it, as an object of its JSON
 Figure = dict[str, Any]
 # Position of a menu, above its chart.
@@ -32,7 +33,7 @@ MENU_POSITION = {
 
 def make_plotly_figure(panel: Panel) -> Figure:
     """Return the figure of a panel: `data`, `layout`, and `frames` of a film."""
-    figure = {"data": _make_traces(panel), "layout": _make_layout(panel)}
+    figure = {"data": make_traces(panel), "layout": _make_layout(panel)}
     if panel.choices:
         _add_menu(figure, panel.choices)
     elif panel.style == "film":
@@ -48,6 +49,11 @@ def _make_layout(panel: Panel) -> Figure:
         "yaxis": _make_axis_layout(panel.y),
         "showlegend": not is_film and sum(bool(curve.name) for curve in panel.curves) > 1,
     }
+    if panel.style == "area":
+        # the peaks at the ends of a contact do not lie on the frame
+        x = panel.curves[0].x
+        room = AREA_MARGIN_FRACTION * np.ptp(x)
+        layout["xaxis"]["range"] = [x.min() - room, x.max() + room]
     if panel.marks:
         layout["shapes"] = list(map(_make_vertical_line, panel.marks))
     if is_film or (panel.style == "map" and panel.y.label.startswith("y")):
@@ -74,7 +80,7 @@ def _make_vertical_line(position: float) -> Figure:
     return {"type": "line", "yref": "paper", "line": line} | ends
 
 
-def _make_traces(panel: Panel) -> list[Figure]:
+def make_traces(panel: Panel) -> list[Figure]:
     """Return the traces of a panel; those of a film have the same range of colours."""
     if panel.style in ("map", "film"):
         traces = [_make_map_trace(curve, panel.colour_label) for curve in panel.curves]
@@ -88,7 +94,7 @@ def _make_traces(panel: Panel) -> list[Figure]:
         if panel.style == "overlay":
             place = number / max(len(panel.curves) - 1, 1)
             mixed = [np.interp(place, (0, 0.5, 1), part) for part in zip(*OVERLAID_CURVE_COLOURS)]
-            colour = "rgb({:.0f},{:.0f},{:.0f})".format(*mixed)
+            colour = "#{:02x}{:02x}{:02x}".format(*map(round, mixed))
         style = "line" if curve.is_line else panel.style
         groups.append((curve.weight, _make_curve_traces(curve, style, colour)))
     # later traces lie above earlier ones
@@ -159,7 +165,7 @@ def _make_map_trace(curve: Curve, label: str) -> Figure:
 
 def _add_menu(figure: Figure, choices: list[Panel]) -> None:
     """Add a menu that shows one of several panels at a time."""
-    groups = [_make_traces(choice) for choice in choices]
+    groups = [make_traces(choice) for choice in choices]
     buttons = []
     for number, choice in enumerate(choices):
         visible = [k == number for k, group in enumerate(groups) for _ in group]

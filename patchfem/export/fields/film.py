@@ -34,19 +34,20 @@ def last_frames(times) -> np.ndarray:
 def contact_window(frames: Frames) -> tuple[float, float, float, float]:
     """Return left, right, bottom and top [m] of a window around the contact in all frames.
 
-    It is twice as wide as the contact; around the largest pressure of a long contact it is a
-    quarter of the length of the pieces.
+    It is twice as wide as the contact, but at least eight elements there; around the largest pressure of a long contact it
+    is a quarter of the length of the pieces.
     """
     line = frames.blocks["interface"]
     x = line.points[:, 0]
     pressure = line.point_data["normal_stress"].max(axis=0)
     length = np.ptp(x)
-    touching = x[pressure > 0]
-    touching = touching if touching.size else x[[0, -1]]
+    loaded = np.flatnonzero(pressure > 0)
+    first, last = loaded[[0, -1]] if loaded.size else (0, x.size - 1)
+    touching = x[[first, last]]
     width = np.ptp(touching)
     is_long = width > MAX_SHOWN_CONTACT_FRACTION * length
-    centre = x[np.argmax(pressure)] if is_long else (touching[0] + touching[-1]) / 2
-    half = length / 8 if is_long else max(width, 4 * np.diff(x).max())
+    centre = x[np.argmax(pressure)] if is_long else touching.mean()
+    half = length / 8 if is_long else max(width, 4 * np.diff(x[max(first - 1, 0) : last + 2]).max())
     left = max(x[0], min(centre - half, x[-1] - 2 * half))
     right = min(x[-1], left + 2 * half)
     reach = WINDOW_HEIGHT_OVER_WIDTH / 2 * (right - left)

@@ -16,7 +16,7 @@ from ...surface.roughness.report import RoughnessReport
 from ...surface.spectrum import WAVE_BAND
 from ..answer import Answer, JsonObject, Remarks, Variables
 from ..quantities import format_value
-from ..rows import make_variables
+from ..rows import make_details, make_variables
 from . import shared
 from .shared import make_maps
 
@@ -211,22 +211,13 @@ def describe_treatment(roughness: RoughnessReport) -> str:
 
 def report_to_dict(roughness: RoughnessReport) -> JsonObject:
     """Return the roughness of a surface as an object of profile.json."""
-    size, treatment = roughness.sampling, roughness.treatment
     has_interval = any(value.low is not None for value in roughness.values)
-    content = {
-        "file": roughness.source,
-        "kind": roughness.kind,
-        "length": size.length,
-        "step": size.step,
-        "shape": size.shape,
-        "cutoff": treatment.cutoff,
-        "window": treatment.window,
-        "form": treatment.form,
-        "s_filter": treatment.short,
-        "confidence": TRACE_INTERVAL_PROBABILITY if has_interval else None,
-        "measures": shared.to_answers({value.name: value for value in roughness.values}),
-        "notes": roughness.notes,
-    }
+    content = make_details(
+        "profile",
+        roughness,
+        confidence=TRACE_INTERVAL_PROBABILITY if has_interval else None,
+        measures=shared.to_answers({value.name: value for value in roughness.values}),
+    )
     if roughness.kind == "areal":
         return content
     return content | {"band": WAVE_BAND, "asperities": _find_moments(roughness)}

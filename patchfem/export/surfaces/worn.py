@@ -18,7 +18,7 @@ from ...wear.between_runs import PatchState, Wear
 from ...wear.predicted import MeasuredDepth, PredictedWear, WearHistory
 from .. import quantities, store
 from ..answer import Answer, Quantity, Remarks, Variables
-from ..rows import make_variables
+from ..rows import make_details, make_variables
 from . import shared
 from .shared import SURFACE_NAMES, build_answer, format_value, make_band, make_maps
 
@@ -148,20 +148,15 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     warnings = warn_of_other_shape(fitted)
 
     # Content of compare.json on the fit and its run.
-    entry = {
-        "coefficient": values["wear_coefficient"],
-        "patch_centre": values["patch_centre"],
-        "difference_rms": fitted.difference_rms,
-        "sentence": sentence,
-        "run": fitted.history.source,
-        "piece": fitted.history.piece,
-        "run_coefficient": fitted.history.coefficient,
-        "proportional_coefficient": fitted.proportional,
-        "extrapolated": fitted.is_extrapolated,
-        "mirrored": fitted.is_mirrored,
-        "warnings": warnings,
-        "notes": notes,
-    }
+    entry = make_details(
+        "predicted",
+        fitted,
+        coefficient=values["wear_coefficient"],
+        patch_centre=values["patch_centre"],
+        sentence=sentence,
+        warnings=warnings,
+        notes=notes,
+    )
     details = answer.details | {"predicted": entry}
     details["sentences"] = [*details["sentences"], sentence, *warnings]
     details["notes"] = [*details["notes"], *notes]

@@ -139,32 +139,30 @@ class Chunks:
         if len(files) < 2:
             return
         names_by_file = [read_chunk(path)[0] for path in files]
-        names = np.concatenate(names_by_file)
-        distinct, newest = np.unique(names, return_index=True)
+        names, newest = np.unique(np.concatenate(names_by_file), return_index=True)
         if removes_others:
             # Sorted, because the other method of NumPy 2.0 overflows for names of 64 bits.
-            newest = newest[np.isin(distinct, self.distinct, kind="sort")]
-
-        # The rows that are kept of each file, from the newest to the oldest one. The files are read one after the other, so
-        # that their results are in memory once.
-        is_kept = np.zeros(names.size, bool)
-        is_kept[newest] = True
-        ends = np.cumsum([own.size for own in names_by_file])
+            is_kept = np.isin(names, self.distinct, kind="sort")
+            names = names[is_kept]
+            newest = newest[is_kept]
 
         def iterate_parts() -> Iterator[tuple[np.ndarray, CaseResults]]:
-            """Yield the places of the kept cases of each file in the new one, and their results."""
-            count = 0
-            for path, part_is_kept in zip(files, np.split(is_kept, ends[:-1]), strict=True):
-                rows = np.flatnonzero(part_is_kept)
-                if rows.size:
-                    yield count + np.arange(rows.size), read_chunk(path)[1].select(rows)
-                    count += rows.size
+            """Yield the places in the new file of the cases that are kept of each file, and their results.
+
+            The files are read one after the other, so that their results are in memory once.
+            """
+            start = 0
+            for path, own in zip(files, names_by_file, strict=True):
+                places = np.flatnonzero((newest >= start) & (newest < start + own.size))
+                if places.size:
+                    yield places, read_chunk(path)[1].select(newest[places] - start)
+                start += own.size
 
         outdated = set(files)
-        if newest.size:
+        if names.size:
             # the new file may have the name of an old one
-            results = join_case_results(newest.size, iterate_parts())
-            outdated.discard(write_chunk(self.folder, names[is_kept], results))
+            results = join_case_results(names.size, iterate_parts())
+            outdated.discard(write_chunk(self.folder, names, results))
         for path in outdated:
             path.unlink()
 

@@ -13,10 +13,6 @@ from .list_numbers import JOIN_ERROR, MAX_STRIPS, cutoff_age, find_max_age
 from .parameters import Bonds
 
 ENGINES = ("direct", "truncated", "merged", "recursion")
-# Upper bound of the error of the force / errors of the joins (measured by test_merge_bounds): in general, and for bonds of
-# reading "report" that grow, whose mean forces are sums over parts of an increment
-FORCE_TO_JOIN_ERROR = 1.0
-FORCE_TO_JOIN_ERROR_GROWING = 6.0
 # Largest change of the force due to the cut-off, as a fraction of the friction limit
 MAX_TAIL = 1e-6
 MAX_MERGE_WIDTH = 0.04  # largest merge width in bond lengths
@@ -44,7 +40,7 @@ class EngineChoice:
 
         `join_error` is the largest error / load of a join that made room in a full list, or 0.
         """
-        return max(self.error, self.tail + FORCE_TO_JOIN_ERROR_GROWING * join_error)
+        return max(self.error, self.tail + join_error)
 
     def reach(self, order: float) -> float:
         """Return the age [bond lengths] beyond which bonds are dropped, or inf if none are dropped."""
@@ -117,10 +113,8 @@ def choose_engine(
     # tolerance, and the cut-off 0.001.
     if tail is None:
         tail = min(1e-3 * tolerance, MAX_TAIL)
-    is_growing = law.has_growth and law.reading == "report"
-    factor = JOIN_ERROR * (FORCE_TO_JOIN_ERROR_GROWING if is_growing else FORCE_TO_JOIN_ERROR)
     if merge is None:
-        merge = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / factor))
+        merge = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / JOIN_ERROR))
     if engine == "auto":
         engine = "merged" if merge > 0 else "truncated"
     tail = 0.0 if engine == "direct" else tail
@@ -130,4 +124,4 @@ def choose_engine(
     reach = min(cutoff_age(law.order, tail) if tail > 0 else inf, find_max_age(law.order))
     strips = reach / stroke * (steps if law.has_growth else 1.0)
     strips = min(strips, MAX_STRIPS) if merge else strips
-    return EngineChoice(engine, tail, merge, tail + factor * merge**2, strips)
+    return EngineChoice(engine, tail, merge, tail + JOIN_ERROR * merge**2, strips)

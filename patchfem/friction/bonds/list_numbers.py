@@ -22,8 +22,13 @@ INITIAL_HALF_WIDTH = 1e-6
 # Path in bond lengths over which the error of a join grows e-fold for orders up to 1, and what each order above adds to it
 JOIN_AGE = 3.0
 JOIN_AGE_PER_ORDER = 2.0
-JOIN_ERROR = 0.1  # error of a join of young strips relative to the load, per square of the merge width [bond lengths]
-MAX_STRIPS = 1024  # strips of a list beyond which joins with larger errors make room
+# Error of a join of young strips relative to the load, per square of the merge width [bond lengths]. The force of a list
+# has an error of this size at most (measured by test_merge_bounds).
+JOIN_ERROR = 0.1
+# Strips of a list beyond which joins with larger errors make room, per reciprocal merge width [bond lengths], and at most. A
+# list of long strokes has fewer than 3 over its width; a block that sticks reverses in each step.
+STRIPS_PER_WIDTH = 16.0
+MAX_STRIPS = 1024
 N_UNMERGED_STRIPS = 20_000  # all strips of lists that join without an error only
 # Age from which bonds have no strength to round-off, for the order 0, and what each order adds
 MAX_AGE = 60.0
@@ -97,7 +102,9 @@ def make_lists(bonds: Bonds, reach: float, merge: float, loads) -> BondLists:
     law = np.append(law, table)
 
     # The initial bonds are a strip that formed at once, without stretch.
-    capacity = MAX_STRIPS if merge else N_UNMERGED_STRIPS // loads.size + MAX_STRIPS
+    capacity = N_UNMERGED_STRIPS // loads.size + MAX_STRIPS
+    if merge:
+        capacity = min(ceil(STRIPS_PER_WIDTH / merge), MAX_STRIPS)
     strips = np.zeros((loads.size, capacity + MAX_NEW_STRIPS, N_STRIP_ENTRIES))
     half = INITIAL_HALF_WIDTH * bonds.length
     unit = bonds.length**bonds.order if is_stretch else 1.0

@@ -4,7 +4,7 @@ An increment adds a strip, or several if bonds grow along it. For a bond length 
 energies are exact.
 """
 
-from math import ceil, exp, expm1, log
+from math import ceil, exp, expm1, log, sqrt
 from typing import NamedTuple
 
 from ...compiled.flags_kernels import NJIT_KERNEL
@@ -16,6 +16,7 @@ from .strip_join_kernels import join_strips, read_strip, write_strip
 from .strip_rows_kernels import MAX_NEW_STRIPS, ListLaw, ListState, Strip
 from .strip_sum_kernels import (
     GAUSS,
+    MIN_BOND_RATIO,
     Moved,
     Stretches,
     find_ages,
@@ -30,13 +31,14 @@ from .strip_sum_kernels import (
 MIN_PATH = 1e-300  # path [m] below which a point rests
 # Largest growth J along a new strip: in more of it nearly all bonds are mature
 MAX_STRIP_GROWTH = 0.25
-# Largest change of the logarithm of the length of bonds along a part of an increment, and largest number of parts
-MAX_PART_CHANGE = 0.02
-MAX_PARTS = 64
-# Largest damage along a part of an increment in which powers of stretches are integrated by two Gauss points, and largest
-# number of these parts
-MAX_PART_DAMAGE = 0.1
-MAX_DAMAGE_PARTS = 256
+# Largest changes of the age, and of the damage where powers of stretches act, and largest growth, along a part of an
+# increment that is integrated by three Gauss points; largest number of these parts
+MAX_PART_AGE = 2.0
+MAX_PART_DAMAGE = 0.6
+MAX_PART_GROWTH = 3.0
+MAX_PARTS = 128
+OUTER_GAUSS = sqrt(0.6)  # place of the outer points in half lengths of a part
+MATURE_CHANGE = 2e-4  # relative change of the length of bonds that is as good as linear in the path
 # Parts at the end of an increment that are shorter than this fraction of the others are left out
 MIN_LAST_PART = 1e-9
 # Increment in bond lengths below which the slope of the mean force is that at this increment
@@ -242,10 +244,8 @@ def pull_new_strips(state, law, increment):
 
 
 @njit(**NJIT_KERNEL)
-def slide_growing_strip(strip, law, increment):
-    """Return the mean force [N] over mu_s of a `Strip` over an increment on which its bonds grow.
-
-    The increment is divided into parts, shorter ones at its start, if the length of the bonds changes much.
+def slide_strip(strip, law, increment):
+    """Return the mean force [N] over mu_s of a `Strip` over an increment.
 
     Parameters
     ----------
@@ -256,30 +256,43 @@ def slide_growing_strip(strip, law, increment):
     increment : Increment
         Increment of the list.
     """
-    before = find_ends(strip, law, move(increment, 0.0))
-    last = find_ages(strip, law, move(increment, 1.0))
-    age = strip.age_1 + strip.age_2
-    change = (last.first + last.last) * age
-    change /= (before.first.age + before.last.age) * (age + 2 * abs(increment.slide))
-    n = abs(log(change)) * max(increment.growth, 1.0) / MAX_PART_CHANGE
-    n = min(max(n, 1.0), MAX_PARTS)
-    low = 0.0
+    # The force is smooth between the instants at which the stretches of the ends vanish. The ages of mature bonds are
+    # linear, so that their mean is exact.
+    grown = find_mature_fraction(strip, law, increment)
+    first = find_passage(strip.stretch_1, increment.slide)
+    last = find_passage(strip.stretch_2, increment.slide)
     mean = 0.0
-    for i in range(count_parts(n)):
-        high = find_part_end(i, n) ** 2
-        after = find_ends(strip, law, move(increment, high))
-        slide = low * increment.slide
-        stretches = Stretches(strip.stretch_1 + slide, strip.stretch_2 + slide)
-        step = (high - low) * increment.slide
-        mean += (high - low) * slide_signs(before, after, strip.weight, stretches, step, law)
-        before = after
+    low = 0.0
+    for high in (min(first, last), max(first, last), 1.0):
+        middle = min(max(grown, low), high)
+        if middle > low:
+            mean += (middle - low) * average_pull(strip, law, increment, low, middle)
+        if high > middle:
+            before = find_ends(strip, law, move(increment, middle))
+            after = find_ends(strip, law, move(increment, high))
+            start = find_stretches(strip, middle * increment.slide)
+            stop = find_stretches(strip, high * increment.slide)
+            force = slide_signs(before, after, strip.weight, start, stop, law)
+            mean += (high - middle) * force
         low = high
     return mean
 
 
 @njit(**NJIT_KERNEL)
-def slide_powers(strip, law, increment):
-    """Return the mean force [N] over mu_s of a `Strip` whose bonds act with a power of their stretches.
+def find_stretches(strip, path):
+    """Return the `Stretches` of a strip after a signed path [m]."""
+    return Stretches(strip.stretch_1 + path, strip.stretch_2 + path)
+
+
+@njit(**NJIT_KERNEL)
+def find_passage(stretch, slide):
+    """Return the fraction of a `slide` [m] at which a `stretch` [m] that increases by it vanishes; 1 if it does not."""
+    return 1.0 if stretch * slide >= 0 else min(-stretch / slide, 1.0)
+
+
+@njit(**NJIT_KERNEL)
+def find_mature_fraction(strip, law, increment):
+    """Return the fraction of an increment after which the ages of a strip are linear; 1 for powers of stretches.
 
     Parameters
     ----------
@@ -290,16 +303,53 @@ def slide_powers(strip, law, increment):
     increment : Increment
         Increment of the list.
     """
-    damage = abs(increment.slide) / increment.middle
-    n = min(max(damage / MAX_PART_DAMAGE, 1.0), MAX_DAMAGE_PARTS)
-    low = 0.0
+    if law[ListLaw.IS_STRETCH] > 0:
+        return 1.0 if law[ListLaw.ORDER] != 0 else 0.0
+    short = max(strip.short_1, strip.short_2)
+    missing = abs(increment.target - increment.before) + short
+    length = max(increment.before - short, MIN_BOND_RATIO * increment.before)
+    change = missing / length * min(increment.growth, 1.0)
+    if change <= MATURE_CHANGE:
+        return 0.0
+    return min(log(change / MATURE_CHANGE) / max(increment.growth, 1.0), 1.0)
+
+
+@njit(**NJIT_KERNEL)
+def average_pull(strip, law, increment, low, high):
+    """Return the mean force [N] over mu_s of a strip between two fractions of an increment, by Gauss quadrature.
+
+    Parameters
+    ----------
+    strip : Strip
+        Strip at the start of the increment.
+    law : (k,) array
+        Entries of `ListLaw`.
+    increment : Increment
+        Increment of the list.
+    low, high : float
+        Fractions, between which the force is smooth.
+    """
+    before = find_ages(strip, law, move(increment, low))
+    after = find_ages(strip, law, move(increment, high))
+    change = max(abs(after.first - before.first), abs(after.last - before.last))
+    n = change / (MAX_PART_DAMAGE if law[ListLaw.IS_STRETCH] > 0 else MAX_PART_AGE)
+    if law[ListLaw.ORDER] < 0:
+        youngest = min(min(before.first, before.last), min(after.first, after.last))
+        n = max(n, change / max(youngest, MIN_PATH))
+    if law[ListLaw.IS_STRETCH] == 0:
+        n = max(n, increment.growth * (high - low) / MAX_PART_GROWTH)
+    n = min(max(n, 1.0), MAX_PARTS)
     mean = 0.0
+    begin = 0.0
     for i in range(count_parts(n)):
-        high = find_part_end(i, n)
-        for side in (-GAUSS, GAUSS):
-            moved = move(increment, 0.5 * (low + high + side * (high - low)))
-            mean += 0.5 * (high - low) * pull_strip(strip, law, moved, increment.slide).force
-        low = high
+        end = find_part_end(i, n)
+        middle = mix(low, high, 0.5 * (begin + end))
+        outer = 0.5 * (end - begin) * (high - low) * OUTER_GAUSS
+        force = 8 * pull_strip(strip, law, move(increment, middle), increment.slide).force
+        for place in (middle - outer, middle + outer):
+            force += 5 * pull_strip(strip, law, move(increment, place), increment.slide).force
+        mean += (end - begin) * force / 18
+        begin = end
     return mean
 
 
@@ -318,8 +368,7 @@ def pull_strip(strip, law, moved, slide):
     slide : float
         Value with the sign of the increment.
     """
-    path = moved.path if slide > 0 else -moved.path
-    stretches = Stretches(strip.stretch_1 + path, strip.stretch_2 + path)
+    stretches = find_stretches(strip, moved.path if slide > 0 else -moved.path)
     if law[ListLaw.IS_STRETCH] * law[ListLaw.ORDER] != 0.0:
         return pull_powers(find_ages(strip, law, moved), strip.weight, stretches, law)
     return pull_signs(find_ends(strip, law, moved), strip.weight, stretches, law)
@@ -345,7 +394,6 @@ def slide_list(bonds, slide, velocity, dt):
     if abs(slide) < smallest:
         probe = smallest if slide >= 0 else -smallest
     increment = make_increment(state, bonds.growth, probe, velocity, velocity, dt)
-    first = move(increment, 0.0)
     last = move(increment, 1.0)
     new = pull_new_strips(state, law, increment)
     mean = new.mean
@@ -353,15 +401,7 @@ def slide_list(bonds, slide, velocity, dt):
     for k in range(int(state[ListState.COUNT])):
         strip = read_strip(strips, k)
         end += pull_strip(strip, law, last, probe).force
-        if law[ListLaw.IS_STRETCH] * law[ListLaw.ORDER] != 0.0:
-            mean += slide_powers(strip, law, increment)
-        elif increment.growth > 0 and law[ListLaw.IS_STRETCH] == 0:
-            mean += slide_growing_strip(strip, law, increment)
-        else:
-            before = find_ends(strip, law, first)
-            after = find_ends(strip, law, last)
-            stretches = Stretches(strip.stretch_1, strip.stretch_2)
-            mean += slide_signs(before, after, strip.weight, stretches, probe, law)
+        mean += slide_strip(strip, law, increment)
     slope = (end - mean) / probe
     change = slide - probe
     return ListForce(mean + change * slope, end + 2 * change * slope, slope)

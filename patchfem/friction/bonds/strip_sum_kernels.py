@@ -85,13 +85,6 @@ class Term(NamedTuple):
     decay: Decay
 
 
-class Passage(NamedTuple):
-    """Sign of the stretch at an end of a strip before it passes 0, and the fraction of the increment at which it does."""
-
-    sign: float
-    fraction: float
-
-
 @njit(**NJIT_INLINE)
 def mix(first, last, fraction):
     """Interpolate linearly between the values `first` at the fraction 0 and `last` at the fraction 1."""
@@ -217,83 +210,45 @@ def average_term(a, b, order, narrow):
     return a.scale * average_integral(a.decay, b.decay, order)
 
 
-@njit(**NJIT_INLINE)
-def find_passage(stretch, step):
-    """Return the `Passage` of an end whose `stretch` [m] increases by a `step` [m]; without one the fraction is 1."""
-    sign = 1.0 if stretch > 0 or (stretch == 0 and step > 0) else -1.0
-    fraction = 1.0 if stretch * step >= 0 else min(-stretch / step, 1.0)
-    return Passage(sign, fraction)
-
-
-@njit(**NJIT_INLINE)
-def average_signed_term(a, b, passage, law, narrow):
-    """Return the mean of an end's term [N] times the sign of its stretch, which may change on the way.
-
-    Parameters
-    ----------
-    a, b : Term
-        Terms at the start and at the end.
-    passage : Passage
-        Passage of the stretch through 0.
-    law : (k,) array
-        Entries of `ListLaw`.
-    narrow : bool
-        Whether the strip is narrow.
-    """
-    order = law[ListLaw.ORDER]
-    part = passage.fraction
-    if part >= 1.0:
-        return passage.sign * average_term(a, b, order, narrow)
-    middle = Term(a.scale, find_decay(mix(a.decay.age, b.decay.age, part), law))
-    before = part * average_term(a, middle, order, narrow)
-    return passage.sign * (before - (1 - part) * average_term(middle, b, order, narrow))
-
-
 @njit(**NJIT_KERNEL)
-def slide_signs(a, b, weight, stretches, step, law):
+def slide_signs(a, b, weight, before, after, law):
     """Return the mean force [N] over mu_s of a strip whose bonds act with the signs of their stretches.
+
+    The ages are linear in the path, and the stretches of the ends keep their signs.
 
     Parameters
     ----------
     a, b : Ends
-        Ends of the strip at the start and at the end of the increment.
+        Ends of the strip at the start and at the end of a slide.
     weight : float
         Weight [N] of the strip.
-    stretches : Stretches
-        Stretches at the start.
-    step : float
-        Their increase [m].
+    before, after : Stretches
+        Stretches of its ends at these instants.
     law : (k,) array
         Entries of `ListLaw`.
     """
+    order = law[ListLaw.ORDER]
     spread = 0.5 * (a.last.age - a.first.age + b.last.age - b.first.age)
     change = abs(b.last.age - b.first.age - spread)
     narrow = change > MAX_SPREAD_CHANGE * abs(spread) or is_narrow(a) or is_narrow(b)
     scale_1 = -0.5 * weight if narrow else weight / spread
     scale_2 = abs(scale_1) if narrow else scale_1
-    first = find_passage(stretches.first, step)
-    last = find_passage(stretches.last, step)
-    mean = average_signed_term(Term(scale_2, a.last), Term(scale_2, b.last), last, law, narrow)
-    mean -= average_signed_term(Term(scale_1, a.first), Term(scale_1, b.first), first, law, narrow)
+    sign_1 = copysign(1.0, before.first + after.first)
+    sign_2 = copysign(1.0, before.last + after.last)
+    mean = sign_2 * average_term(Term(scale_2, a.last), Term(scale_2, b.last), order, narrow)
+    mean -= sign_1 * average_term(Term(scale_1, a.first), Term(scale_1, b.first), order, narrow)
+    if sign_1 == sign_2:
+        return mean
 
-    # Between the passages of its ends, a strip has bonds without stretch.
-    early = min(first.fraction, last.fraction)
-    is_passing = first.sign != last.sign
-    begin = 0.0 if is_passing else early
-    stop = early if is_passing else max(first.fraction, last.fraction)
-    if stop > begin:
-        span = stretches.last - stretches.first
-        place = min(max(-(stretches.first + begin * step) / span, 0.0), 1.0)
-        age_1 = mix(a.first.age, b.first.age, begin)
-        age = mix(age_1, mix(a.last.age, b.last.age, begin), place)
-        start = Term(mix(scale_1, scale_2, place), find_decay(age, law))
-        place = min(max(-(stretches.first + stop * step) / span, 0.0), 1.0)
-        age_1 = mix(a.first.age, b.first.age, stop)
-        age = mix(age_1, mix(a.last.age, b.last.age, stop), place)
-        finish = Term(mix(scale_1, scale_2, place), find_decay(age, law))
-        sign = copysign(2.0, stretches.last + 0.5 * (begin + stop) * step)
-        mean -= sign * (stop - begin) * average_term(start, finish, law[ListLaw.ORDER], narrow)
-    return mean
+    # Bonds without stretch lie between ends of opposite signs.
+    span = before.last - before.first
+    place = min(max(-before.first / span, 0.0), 1.0)
+    age = mix(a.first.age, a.last.age, place)
+    start = Term(mix(scale_1, scale_2, place), find_decay(age, law))
+    place = min(max(-after.first / span, 0.0), 1.0)
+    age = mix(b.first.age, b.last.age, place)
+    finish = Term(mix(scale_1, scale_2, place), find_decay(age, law))
+    return mean - (sign_2 - sign_1) * average_term(start, finish, order, narrow)
 
 
 # ---- bonds that act with a power of their stretches

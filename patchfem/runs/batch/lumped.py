@@ -29,7 +29,7 @@ from ...points.case_rows import (
     Number,
 )
 from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
-from ...points.law_rows import Law
+from ...points.law_rows import Law, LawNumber
 from ...points.laws import N_NUMBERS, POINT_LAWS, list_point_law
 from ...response import rows
 from ...response.errors import ERROR_MEASURES, convergence_errors, total_error
@@ -58,7 +58,6 @@ from ...response.settling import (
     select_reported,
 )
 from ...scene.rules.accuracy import list_fixed_settings
-from ...structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ..results.notes import MAX_WORK_CHECK
 from ..results.result import shorten_file_names
 from ..rig.motion_warnings import note_on_creep
@@ -97,25 +96,40 @@ SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 CREEP_KEY = "friction.reference_speed"  # key on which the note on creep depends
 
 
-class Scales(NamedTuple):
-    """Tolerances and reference quantities of n cases, (n,) each.
+class Group(NamedTuple):
+    """Cases with the same law and number of cycles, with what their errors are relative to, (n,) each.
 
+    - cases: the n cases
     - tolerance: relative tolerance [1]
     - displacement: displacement scale of the rig [m]
-    - acceleration: largest acceleration of the drive [m s-2]
-    - decay: smallest decay rate of the mode [1/s]
-    - limit: largest static friction force [N]
     - stick_stiffness: stiffness of the law during stick [N/m]; 0 of rigid and of viscous laws
     - may_create: whether the law may create energy
     """
 
+    cases: Cases
     tolerance: np.ndarray
     displacement: np.ndarray
-    acceleration: np.ndarray
-    decay: np.ndarray
-    limit: np.ndarray
     stick_stiffness: np.ndarray
     may_create: np.ndarray
+
+    def read(self, number: Number) -> np.ndarray:
+        """Return a parameter (n,) of the cases."""
+        return self.cases.parameters[:, number]
+
+    @property
+    def period(self) -> np.ndarray:
+        """Duration (n,) of a cycle [s]."""
+        return 2 * np.pi / self.read(Number.OMEGA)
+
+    @property
+    def decay(self) -> np.ndarray:
+        """Logarithmic decay (n,) of a free vibration in a cycle [1], 0 if it is not damped."""
+        return np.maximum(0.5 * self.read(Number.DAMPING), 0.0) * self.period
+
+    @property
+    def window(self) -> int:
+        """Number of the last cycles, which are measured."""
+        return int(self.cases.parameters[0, Number.WINDOW])
 
 
 class Refined(NamedTuple):
@@ -199,14 +213,13 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
     A single run computes each case that `needs_single_run` names. `report` takes a line of text on its progress.
     """
     begin = process_time()
-    cases, scales = collect_cases(models)
+    group = collect_cases(models)
     results = CaseResults.blank(len(models))
     is_alone = np.ones(len(models), bool)
-    for indices, refined in refine(cases, scales):
-        part_scales = _select(scales, indices)
-        part_models = select_models(models, indices)
-        part_results = make_results(part_models, _select(cases, indices), part_scales, refined)
-        is_alone[indices] = needs_single_run(part_scales, refined, part_results)
+    for indices, refined in refine(group):
+        part = _select(group, indices)
+        part_results = make_results(select_models(models, indices), part, refined)
+        is_alone[indices] = needs_single_run(part, refined, part_results)
         results.insert(indices, part_results)
     _insert_texts(models, results)
     results.seconds[:] = (process_time() - begin) / len(models)
@@ -214,47 +227,34 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
     return results
 
 
-def collect_cases(models: Sequence[Model]) -> tuple[Cases, Scales]:
-    """Return the numbers of models with the same law and number of cycles as arrays over the models.
-
-    The second record has their tolerances and the reference quantities of their errors.
-    """
+def collect_cases(models: Sequence[Model]) -> Group:
+    """Return the numbers of models with the same law and number of cycles as arrays over the models."""
     columns = collect_columns(models, _list_numbers)
-    n_numbers, n_scales = len(Number), len(Scales._fields)
-    ends = [n_numbers, n_numbers + N_NUMBERS, -1 - n_scales, -n_scales]
-    *arrays, reference, scales = np.split(columns, ends)
-    return Cases(*(np.ascontiguousarray(part.T) for part in arrays), reference[0]), Scales(*scales)
+    parameters, numbers, others = np.split(columns, [len(Number), len(Number) + N_NUMBERS])
+    arrays = map(np.ascontiguousarray, (parameters.T, numbers.T))
+    return Group(Cases(*arrays, others[0]), *others[1:])
 
 
 def _list_numbers(model: Model) -> tuple[float, ...]:
     """Return the numbers of a model as a flat tuple, which `collect_cases` takes apart again.
 
-    They are the parameters of the rig (`Number`), those of the friction law, its memory at rest, the stiffness of the
-    first mode at the contact, and the fields of `Scales`.
+    They are the parameters of the rig (`Number`), those of the friction law, the stiffness of the first mode at the
+    contact, and the fields of `Group` after the cases.
     """
     rig, friction = model.rig, model.friction
     load = model.point.load
     # Bonds of a batch do not grow.
     has_bonds = law_has_trait(friction.law, "bonds")
     law = Bonds(friction.static, friction.bond_length) if has_bonds else make_law(friction, load)
+    has_stiffness = not law_has_trait(friction.law, "memoryless")
     cycles = int(rig.drive.cycles)
-
-    # Stiffness during stick
-    stiffness = 0.0
-    if not law_has_trait(friction.law, "memoryless"):
-        stiffness = friction.static * load / law.length
-
-    # The order is that of `collect_cases`: `Number`, law, memory, stiffness of the mode, `Scales`.
     return (
         *list_parameters(rig.modes, rig.drive.signal, load, cycles, min(10, cycles // 10), rig.start),
         *list_point_law(friction.law, law, load),
         rig.first_mode.stiffness,
         model.accuracy.tolerance,
         rig.displacement_scale,
-        find_max_acceleration(rig.drive.signal),
-        find_min_decay_rate(rig.modes),
-        friction.static * load,
-        stiffness,
+        law.static * load / law.length if has_stiffness else 0.0,
         _may_create_energy(model),
     )  # fmt: skip
 
@@ -269,29 +269,29 @@ def _may_create_energy(model: Model):
     return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
 
 
-def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]:
+def refine(group: Group) -> Iterator[tuple[np.ndarray, Refined]]:
     """March cases, and those that miss their tolerance again with more steps.
 
     Yields indices of cases and their march, for those that meet their tolerance after each march, and at the end for the
     others. The errors follow from the one or two marches before, with fewer steps. Exact steps need a single march; cases
     without a closed form are left out.
     """
-    remaining = np.arange(len(cases.parameters))
-    if is_linear_between_events(cases):
-        remaining = np.flatnonzero(has_closed_form(cases, scales))
+    remaining = np.arange(len(group.tolerance))
+    if is_linear_between_events(group.cases):
+        remaining = np.flatnonzero(has_closed_form(group))
         if remaining.size:
-            part = _select(cases, remaining)
-            march = march_cases(part, EXACT_STEPS_PER_CYCLE)
-            errors = estimate_exact_errors(part, _select(scales, remaining), march)
+            part = _select(group, remaining)
+            march = march_cases(part.cases, EXACT_STEPS_PER_CYCLE)
+            errors = estimate_exact_errors(part, march)
             is_met = np.ones(remaining.size, bool)
             yield remaining, Refined(march, errors, EXACT_STEPS_PER_CYCLE, is_met)
         return
 
-    coarser = [march_cases(cases, BATCH_STEPS_PER_CYCLE[0]).values]
+    coarser = [march_cases(group.cases, BATCH_STEPS_PER_CYCLE[0]).values]
     for count in BATCH_STEPS_PER_CYCLE[1:]:
-        part_cases, part = _select(cases, remaining), _select(scales, remaining)
-        fine = march_cases(part_cases, count)
-        errors = estimate_errors(part_cases, [fine.values, *coarser], count)
+        part = _select(group, remaining)
+        fine = march_cases(part.cases, count)
+        errors = estimate_errors(part, [fine.values, *coarser], count)
         is_met = np.ones(remaining.size, bool)
         for name in fine.values.keys() - set(INTERNAL_VALUES):
             value = fine.values[name]
@@ -311,15 +311,14 @@ def refine(cases: Cases, scales: Scales) -> Iterator[tuple[np.ndarray, Refined]]
         coarser = [_select(values, ~is_done) for values in (fine.values, coarser[0])]
 
 
-def find_repeat_error(cases: Cases, same: float) -> np.ndarray:
+def find_repeat_error(group: Group, same: float) -> np.ndarray:
     """Return the relative error (n,) of a motion that is not computed further because it repeats.
 
     A cycle differs from the one before by at most `same`, relative to the range of the motion. The differences of the
     cycles left out decrease at least as fast as the mode rings down, so that their sum is that of a geometric series.
     """
-    columns = cases.parameters.T
-    decrease = -np.expm1(-np.pi * columns[Number.DAMPING] / columns[Number.OMEGA])
-    return same / np.maximum(decrease, 1 / columns[Number.CYCLES])
+    decrease = -np.expm1(-np.pi * group.read(Number.DAMPING) / group.read(Number.OMEGA))
+    return same / np.maximum(decrease, 1 / group.read(Number.CYCLES))
 
 
 def find_size(name: str, values: dict[str, np.ndarray]) -> np.ndarray:
@@ -331,13 +330,13 @@ def find_size(name: str, values: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def estimate_errors(
-    cases: Cases, marches: Sequence[dict[str, np.ndarray]], steps: int
+    group: Group, marches: Sequence[dict[str, np.ndarray]], steps: int
 ) -> dict[str, np.ndarray]:
     """Return the errors (n,) by name from the values of a march and of one or two coarser ones.
 
     Parameters
     ----------
-    cases : Cases
+    group : Group
         The n cases.
     marches : sequence of dict
         Values (n,) by name; each march after the first has half the steps of the one before.
@@ -345,7 +344,7 @@ def estimate_errors(
         Steps per cycle of the first march.
     """
     fine = marches[0]
-    repeat_error = find_repeat_error(cases, SAME_SMOOTH_CYCLE / steps**3)
+    repeat_error = find_repeat_error(group, SAME_SMOOTH_CYCLE / steps**3)
     with np.errstate(all="ignore"):
         errors = convergence_errors(*marches, order=BATCH_ORDER, max_order=BATCH_ORDER)
 
@@ -365,7 +364,7 @@ def estimate_errors(
         return errors
 
 
-def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dict[str, np.ndarray]:
+def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarray]:
     """Return the errors of the measures of a march by exact steps.
 
     The work of a motion that repeats may be wrong by the error of the motion times the work that the largest force does
@@ -374,10 +373,8 @@ def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dic
 
     Parameters
     ----------
-    cases : Cases
+    group : Group
         The n cases.
-    scales : Scales
-        Stiffnesses of the cases during stick.
     march : CaseMarch
         March of the cases, with the values of their measures.
 
@@ -387,8 +384,8 @@ def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dic
         Error of each measure by name, in its unit.
     """
     values = march.values
-    repeat_error = find_repeat_error(cases, SAME_CASE_CYCLE)
-    drive_phase, phase = find_step_phases(cases, scales)
+    repeat_error = find_repeat_error(group, SAME_CASE_CYCLE)
+    drive_phase, phase = find_step_phases(group)
     errors = {}
     for name in values:
         size = find_size(name, values)
@@ -399,7 +396,7 @@ def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dic
             relative = relative + 9 * INTEGRAL_REMAINDER * drive_phase * (3 * drive_phase) ** 5
         errors[name] = total_error(name, values, [relative * size], repeat_error)
 
-    slide = values[AMPLITUDE] / np.abs(cases.parameters[:, Number.OUTPUT])
+    slide = values[AMPLITUDE] / np.abs(group.read(Number.OUTPUT))
     difference = np.where(values["slip_amplitude"] > 0, repeat_error, SAME_CASE_CYCLE)
     work = difference * values["friction_force_peak"] * slide
     errors["loop_area"] += work
@@ -411,45 +408,41 @@ def estimate_exact_errors(cases: Cases, scales: Scales, march: CaseMarch) -> dic
     return errors
 
 
-def find_step_phases(cases: Cases, scales: Scales) -> tuple[np.ndarray, np.ndarray]:
+def find_step_phases(group: Group) -> tuple[np.ndarray, np.ndarray]:
     """Return the phases (n,) [rad] of the drive and of the fastest vibration in an exact step of the window.
 
     Parameters
     ----------
-    cases : Cases
+    group : Group
         The n cases.
-    scales : Scales
-        Stiffnesses of the cases during stick.
     """
-    columns = cases.parameters.T
-    stiffness = columns[Number.STIFFNESS] + columns[Number.MOBILITY] * scales.stick_stiffness
-    ratio = np.fmax(np.sqrt(stiffness) / columns[Number.OMEGA], 1.0)
+    added = group.read(Number.MOBILITY) * group.stick_stiffness
+    stiffness = group.read(Number.STIFFNESS) + added
+    ratio = np.fmax(np.sqrt(stiffness) / group.read(Number.OMEGA), 1.0)
     n_steps = np.clip(2 * np.pi * ratio / MAX_STEP_PHASE, EXACT_STEPS_PER_CYCLE, MAX_STEPS)
     drive = 2 * np.pi / (n_steps * WINDOW_STEPS)
     return drive, drive * ratio
 
 
-def has_closed_form(cases: Cases, scales: Scales) -> np.ndarray:
+def has_closed_form(group: Group) -> np.ndarray:
     """Return a mask (n,) of the cases whose mode vibrates, and that have a forced motion.
 
     Parameters
     ----------
-    cases : Cases
+    group : Group
         The n cases.
-    scales : Scales
-        Stiffnesses of the cases during stick.
     """
-    columns = cases.parameters.T
+    columns = group.cases.parameters.T
     damping = columns[Number.DAMPING]
     square = columns[Number.OMEGA] ** 2
     has = columns[Number.STIFFNESS] > damping**2 / 4
-    for added in (0.0, columns[Number.MOBILITY] * scales.stick_stiffness):
+    for added in (0.0, columns[Number.MOBILITY] * group.stick_stiffness):
         detuning = columns[Number.STIFFNESS] + added - square
         has &= np.hypot(detuning, damping * columns[Number.OMEGA]) > MIN_DETUNING * square
     return has
 
 
-def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.ndarray:
+def find_floor(name: str, values: dict[str, np.ndarray], group: Group) -> np.ndarray:
     """Return the absolute part (n,) of the allowed error of a measure, in its unit.
 
     The allowed error is the tolerance times the value plus this floor. A small difference of large terms cannot have a
@@ -461,63 +454,57 @@ def find_floor(name: str, values: dict[str, np.ndarray], scales: Scales) -> np.n
         Name of the measure.
     values : dict of str to (n,) array
         All measures of the cases.
-    scales : Scales
-        Tolerances and reference quantities of the cases.
+    group : Group
+        The n cases.
     """
-    floor = error_floor(name, values, scales.displacement)
-    return np.fmax(floor, scales.tolerance * larger_term(name, values))
+    floor = error_floor(name, values, group.displacement)
+    return np.fmax(floor, group.tolerance * larger_term(name, values))
 
 
 def _select(record, rows):
-    """Return the given rows of all arrays of a record or dict, which may contain dicts of arrays."""
+    """Return the given rows of an array, or of all arrays in a record or dict."""
     if isinstance(record, dict):
-        return {name: value[rows] for name, value in record.items()}
-    return type(record)(
-        *(_select(field, rows) if isinstance(field, dict) else field[rows] for field in record)
-    )
+        return {name: _select(value, rows) for name, value in record.items()}
+    if isinstance(record, tuple):
+        return type(record)(*(_select(field, rows) for field in record))
+    return record[rows]
 
 
-def make_results(
-    models: Sequence[Model], cases: Cases, scales: Scales, refined: Refined
-) -> CaseResults:
+def make_results(models: Sequence[Model], group: Group, refined: Refined) -> CaseResults:
     """Return the measures of n cases as their single runs would have them, with errors, outcomes and reasons.
 
     Parameters
     ----------
     models : sequence of Model
         Models of the cases.
-    cases : Cases
+    group : Group
         The n cases.
-    scales : Scales
-        Tolerances and reference quantities of the cases.
     refined : Refined
         March of the cases with as many steps as their tolerances need.
     """
     values, errors = dict(refined.march.values), dict(refined.errors)
-    results = CaseResults.blank(len(scales.tolerance))
-    window = int(cases.parameters[0, Number.WINDOW])
-    classes, steady = _judge_motions(cases, scales, refined)
-    is_stuck = values["slip_amplitude"] <= _stick_tolerance(cases, scales)
+    results = CaseResults.blank(len(group.tolerance))
+    classes, steady = _judge_motions(group, refined)
+    is_stuck = values["slip_amplitude"] <= _stick_tolerance(group)
 
     # A mode that vibrates freely above a sticking interface is not steady, nor is one whose mean stretch increases.
-    ringing = np.where(is_stuck, find_visible_ringing(cases, scales, refined), 0.0)
+    ringing = np.where(is_stuck, find_visible_ringing(group, refined), 0.0)
     is_ringing = ringing > 0
-    force = np.diff(np.abs(refined.march.stretches), axis=1)[:, 0] * scales.stick_stiffness
-    is_loading = is_stuck & (force > scales.tolerance * values["friction_force_peak"])
+    force = np.diff(np.abs(refined.march.stretches), axis=1)[:, 0] * group.stick_stiffness
+    is_loading = is_stuck & (force > group.tolerance * values["friction_force_peak"])
     is_changing = is_ringing | is_loading
     classes = np.where(is_changing, MOTION_CLASSES.index(Outcome.TRANSIENT), classes)
     names = np.array([*map(str, MOTION_CLASSES), str(Outcome.STUCK)], object)
     results.outcome[:] = names[np.where(is_stuck & ~is_changing, len(MOTION_CLASSES), classes)]
-    period = 2 * np.pi / cases.parameters[:, Number.OMEGA]
     for case in np.flatnonzero(is_ringing):
-        limits = scales.tolerance[case], scales.decay[case] * period[case]
+        limits = group.tolerance[case], group.decay[case]
         ratio = ringing[case] / values[AMPLITUDE][case]
         results.warnings[case] = [describe_ringing(ratio, limits, refined.march.extremes.shape[1])]
 
     # The steady amplitude is a measure if the motion still changes.
     with np.errstate(invalid="ignore"):
         values[STEADY_AMPLITUDE], errors[STEADY_AMPLITUDE] = select_reported(
-            steady, results.outcome, values[AMPLITUDE], errors[AMPLITUDE], scales.tolerance
+            steady, results.outcome, values[AMPLITUDE], errors[AMPLITUDE], group.tolerance
         )
         values[STEADY_AMPLITUDE] = np.where(is_loading, np.nan, values[STEADY_AMPLITUDE])
 
@@ -529,7 +516,7 @@ def make_results(
             results.units[name] = MOTION_TABLE[name].unit
             results.values[name] = value
             results.errors[name] = np.where(is_known & ~grows, errors[name], np.nan)
-            results.floors[name] = np.where(is_known, find_floor(name, values, scales), np.nan)
+            results.floors[name] = np.where(is_known, find_floor(name, values, group), np.nan)
 
     is_unresolved = np.isnan(values[STEADY_AMPLITUDE])
     is_unresolved &= results.outcome == str(Outcome.TRANSIENT)
@@ -545,7 +532,7 @@ def make_results(
     # Measures that a case lacks get the reasons that a single run states. They are the same for cases that lack the same
     # measures and stick alike.
     drive = first.rig.drive.signal
-    last_cycles = SimpleNamespace(time=np.array([0.0, window * drive.period]), extra={})
+    last_cycles = SimpleNamespace(time=np.array([0.0, group.window * drive.period]), extra={})
     sticking = values["stick_fraction"]
     patterns = np.vstack([results.find_known(), sticking == 1, sticking > 0])
     _, firsts, places = np.unique(patterns, axis=1, return_index=True, return_inverse=True)
@@ -557,7 +544,7 @@ def make_results(
     results.numerics[:] = {
         "engine": BATCH_ENGINE,
         "steps_per_cycle": refined.steps,
-        "window_cycles": window,
+        "window_cycles": group.window,
     }
     return results
 
@@ -576,39 +563,36 @@ def _put_reason(results: CaseResults, name: str, is_missing: np.ndarray, reason:
     results.reasons.setdefault(name, CodedColumn(len(results)))[is_missing] = reason
 
 
-def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
+def _stick_tolerance(group: Group) -> np.ndarray:
     """Return the largest slip amplitude (n,) [m] of a sticking interface; -1 of a law that never sticks."""
-    stiffness = scales.stick_stiffness
-    if not stiffness.any():
-        return np.where(cases.numbers[:, 0] == Law.COULOMB, 0.0, -1.0)
-    return MAX_STICKING_SLIP_RATIO * scales.limit / stiffness
+    numbers = group.cases.numbers.T
+    if not group.stick_stiffness.any():
+        return np.where(numbers[0] == Law.COULOMB, 0.0, -1.0)
+    return MAX_STICKING_SLIP_RATIO * numbers[LawNumber.LIMIT] / group.stick_stiffness
 
 
-def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds:
+def _judge_motions(group: Group, refined: Refined) -> MotionEnds:
     """Classify the motions of n cases by their outcome, and estimate their steady amplitudes.
 
     Parameters
     ----------
-    cases : Cases
+    group : Group
         The n cases.
-    scales : Scales
-        Magnitudes of the motions, with the decay rates of the modes `decay` (n,) [1/s].
     refined : Refined
         March of the cases, with the smallest and largest output `extremes` (n, cycles, 2) [m] of each cycle.
     """
     march, values = refined.march, refined.march.values
-    omega = cases.parameters[:, Number.OMEGA]
-    window = int(cases.parameters[0, Number.WINDOW])
+    drive = np.abs(group.read(Number.DRIVE) * group.read(Number.OUTPUT))
 
     # The amplitudes of the final windows are extrapolated to infinite time.
     with np.errstate(all="ignore"):
         classes, steady = judge_motions(
             march.extremes,
             march.phasors,
-            window,
-            scales.tolerance,
-            AMPLITUDE_ROUND_OFF * scales.acceleration / omega**2,
-            scales.decay * window * 2 * np.pi / omega,
+            group.window,
+            group.tolerance,
+            AMPLITUDE_ROUND_OFF * drive / group.read(Number.OMEGA) ** 2,
+            group.decay * group.window,
         )
 
     # A periodic motion about a moving mean is transient.
@@ -616,8 +600,8 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds
         values["drift_per_cycle"],
         refined.errors["drift_per_cycle"],
         values[AMPLITUDE],
-        scales.tolerance,
-        error_floor("drift_per_cycle", values, scales.displacement),
+        group.tolerance,
+        error_floor("drift_per_cycle", values, group.displacement),
     )
     is_steady = classes == MOTION_CLASSES.index(Outcome.STEADY)
     return MotionEnds(
@@ -625,36 +609,33 @@ def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> MotionEnds
     )
 
 
-def find_visible_ringing(cases: Cases, scales: Scales, refined: Refined) -> np.ndarray:
+def find_visible_ringing(group: Group, refined: Refined) -> np.ndarray:
     """Return the free vibrations (n,) [m] of the modes of n cases whose points stick; 0 where none is visible.
 
     Parameters
     ----------
-    cases : Cases
+    group : Group
         The n cases.
-    scales : Scales
-        Tolerances and reference quantities of the cases.
     refined : Refined
         March of the cases.
     """
-    window = int(cases.parameters[0, Number.WINDOW])
     march = refined.march
-    decay = scales.decay * 2 * np.pi / cases.parameters[:, Number.OMEGA]
-    ringing = remaining_ringing(measure_windows(march.extremes, window), decay * window)
+    windows = measure_windows(march.extremes, group.window)
+    ringing = remaining_ringing(windows, group.decay * group.window)
     amplitude = march.values[AMPLITUDE]
-    floor = find_floor(AMPLITUDE, march.values, scales)
+    floor = find_floor(AMPLITUDE, march.values, group)
     sizes = amplitude, refined.errors[AMPLITUDE], floor
-    is_visible = is_ringing_visible(ringing, *sizes, scales.tolerance) & (amplitude > 0)
+    is_visible = is_ringing_visible(ringing, *sizes, group.tolerance) & (amplitude > 0)
     return np.where(is_visible, ringing, 0.0)
 
 
-def needs_single_run(scales: Scales, refined: Refined, results: CaseResults) -> np.ndarray:
+def needs_single_run(group: Group, refined: Refined, results: CaseResults) -> np.ndarray:
     """Return a mask (n,) of the cases that only a single run can compute.
 
     Parameters
     ----------
-    scales : Scales
-        Tolerances and reference quantities of the cases.
+    group : Group
+        The n cases.
     refined : Refined
         March of the cases with as many steps as their tolerances need.
     results : CaseResults
@@ -662,8 +643,8 @@ def needs_single_run(scales: Scales, refined: Refined, results: CaseResults) -> 
     """
     values = refined.march.values
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
-    is_alone |= scales.may_create > 0
-    is_alone |= ~(scales.limit > 0) | (scales.acceleration == 0)
+    is_alone |= group.may_create > 0
+    is_alone |= ~(group.read(Number.LOAD) > 0) | (group.read(Number.DRIVE) == 0)
 
     with np.errstate(invalid="ignore"):
         is_alone |= ~(values["work_check"] <= MAX_WORK_CHECK)

@@ -31,39 +31,26 @@ from .engine import BenchEngine, choose_bench_engine, sample_path
 from .slides import SlideHistories, SlideTask, follow_path
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class BenchRun:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BenchRun(SlideHistories):
     """Histories, fields and measures of an interface under a prescribed displacement, at k samples.
 
     - time, slide, rate (k,): time [s], relative displacement [m] and velocity [m/s].
-    - force, load, slip (k,): friction force [N], normal load [N], irreversible displacement [m].
-    - ledger (4, k): cumulative work, stored energy, cumulative dissipated and created energy [J].
     - frames (f,): indices of the samples at which fields are stored.
-    - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
     - values: measures by name.
     - seconds: CPU time [s].
     - first: index of the sample at which the last cycle starts.
     - engine: method that computed the friction force.
-    - contact: contact points that followed the path; None for other methods.
-    - join_error: largest error of a join that made room in a full list of bonds, relative to the load.
     """
 
     time: np.ndarray
     slide: np.ndarray
     rate: np.ndarray
-    force: np.ndarray
-    load: np.ndarray
-    slip: np.ndarray
-    ledger: np.ndarray
     frames: np.ndarray
-    tau: np.ndarray
-    local: np.ndarray
     values: Values
     seconds: float
     first: int
     engine: BenchEngine
-    contact: object = None
-    join_error: float = 0.0
 
     @property
     def last_cycle(self) -> Response:
@@ -146,7 +133,7 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
         seconds=process_time() - begin,
         first=first,
         engine=engine,
-        **histories._asdict(),
+        **vars(histories),
     )
 
 

@@ -8,7 +8,7 @@ force.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -33,7 +33,8 @@ N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a 
 CREATED_ENERGY_ROUND_OFF = 1e-13
 
 
-class SlideHistories(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class SlideHistories:
     """Histories of force, slip and energies of a bench run, at k samples.
 
     - force, load (k,): friction force and normal load [N].

@@ -3,15 +3,16 @@
 In: a `PatchModel` whose loading and gap shapes may contain arrays, and a tolerance. Out: a `Batch`. The cases are pressed
 together on nested meshes. Those that miss the tolerance go on with the next mesh. When this would be too expensive, they
 are divided by the ends of their contacts, and each part gets meshes that are graded to its own contacts. A case
-that is alone has the meshes of a single run, which ends with its tolerance or with the limit of the mesh.
+that is alone ends with its tolerance or with the limit of the mesh of a single run.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError
 from ...mesh.grading import Layout
+from ..refine import NO_LIMIT, Verdict, refine
 from . import grids, mesh_levels
 from .cases import Batch, CaseMeasures, Cases, MeshFact, make_cases, take_patch
 from .condensed import CondensedPair, condense
@@ -20,7 +21,6 @@ from .measures import (
     MeshValues,
     collect_mesh_values,
     estimate_static_measures,
-    max_mesh_error_ratio,
 )
 from .press import Level, PressedCases, make_level, press_on_level
 from .values import contact_reaches_steep_end, find_contact_edges
@@ -72,7 +72,7 @@ def find_contact_places(pressed: PressedCases) -> ContactPlaces:
     return ContactPlaces(pressed.active[:, 0], np.where(edges.exists, crossings, np.nan))
 
 
-def join_places(parts: list[ContactPlaces]) -> ContactPlaces:
+def join_places(parts: Sequence[ContactPlaces]) -> ContactPlaces:
     """Return the contacts of several parts of the cases one after the other."""
     counts = [part.crossings.shape for part in parts]
     crossings = np.full((sum(n for n, _ in counts), max(e for _, e in counts)), np.nan)
@@ -110,17 +110,22 @@ def collect_facts(pressed: PressedCases) -> np.ndarray:
     return facts
 
 
-class PressedParts(NamedTuple):
-    """Cases that are pressed on one mesh.
+class OpenCases(NamedTuple):
+    """Cases of a group that go on with finer meshes.
 
-    - values: their measures on the mesh.
-    - places: where their contacts begin and end.
-    - is_missing (k,): cases that miss the tolerance, or all if it is not judged; those that fail are left out.
+    - numbers (k,): numbers of the cases.
+    - places: where their contacts begin and end; None if nothing is known.
+    - series: their measures on the meshes so far, from coarse to fine.
     """
 
-    values: MeshValues
-    places: ContactPlaces
-    is_missing: np.ndarray
+    numbers: np.ndarray
+    places: ContactPlaces | None
+    series: list[MeshValues]
+
+    def take(self, rows) -> "OpenCases":
+        """Return selected cases; `rows` are indices or a mask (k,)."""
+        places = None if self.places is None else self.places.take(rows)
+        return OpenCases(self.numbers[rows], places, [mesh.take(rows) for mesh in self.series])
 
 
 def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
@@ -142,27 +147,11 @@ def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
     Batch
     """
     solver = _CaseSolver(patch_model, make_cases(patch_model, count), tolerance)
-    if count == 1:
-        for number in range(count):
-            solver.solve_alone(number)
-    elif patch_model.mesh.is_automatic:
+    if patch_model.mesh.is_automatic:
         solver.solve()
     else:
         solver.solve_on_given_meshes()
     return solver.batch
-
-
-class _Group(NamedTuple):
-    """Cases that have the same meshes.
-
-    - numbers (k,): numbers of the cases.
-    - layout: columns of their coarsest mesh.
-    - places: where the contacts begin and end from which the search on that mesh starts; None if nothing is known.
-    """
-
-    numbers: np.ndarray
-    layout: Layout
-    places: ContactPlaces | None = None
 
 
 class _CaseSolver:
@@ -189,137 +178,111 @@ class _CaseSolver:
         """Solve the cases on meshes that they share, and those that miss the tolerance on meshes of smaller groups."""
         numbers = np.arange(self.cases.n_cases)
         search = _ContactSearch(self.patch_model, self.cases, numbers)
-        layout, contact = grids.search_layout(self.patch_model, search.find_contacts)
-        # Nothing is loaded, or no case can be pressed; the single runs tell why
-        if contact is None:
-            for number in numbers.tolist():
-                self.solve_alone(number)
-            return
-        groups = [_Group(numbers, layout, search.guess_places())]
+        layout, _ = grids.search_layout(self.patch_model, search.find_contacts)
+        groups = [(OpenCases(numbers, search.guess_places(), []), layout)]
         while groups:
-            missing = self._solve_group(groups.pop())
+            cases, layout = groups.pop()
+            missing = self._refine(cases, grids.make_grids(self.patch_model, layout))
             # A case that is alone has reached the limit of the mesh
-            if missing.size:
+            if missing.size and cases.numbers.size > 1:
                 groups += self._divide(missing)
 
-    def _divide(self, numbers: np.ndarray) -> "list[_Group]":
-        """Divide cases (k,) into two groups whose contacts end at similar places, with meshes for these contacts."""
+    def _divide(self, numbers: np.ndarray) -> list[tuple[OpenCases, Layout]]:
+        """Divide cases (k,) into two groups whose contacts end at similar places, with the columns of their meshes."""
         spans = np.array([self.contacts[number].extents[0].span for number in numbers.tolist()])
         side = np.ptp(spans, axis=0).argmax()
         order = np.argsort(spans[:, side], kind="stable")
         groups = []
-        for rows in np.array_split(order, 2):
+        for rows in filter(len, np.array_split(order, 2)):
             spread = np.linspace(0, rows.size - 1, min(rows.size, MAX_GRADED_CONTACTS))
             graded = numbers[rows[spread.round().astype(int)]].tolist()
             layout = grids.make_common_layout([self.contacts[number] for number in graded])
-            groups.append(_Group(numbers[rows], layout))
+            groups.append((OpenCases(numbers[rows], None, []), layout))
         return groups
-
-    def solve_alone(self, number: int) -> None:
-        """Solve one case like a single run."""
-        try:
-            fine, *_ = mesh_levels.solve_with_coarser(
-                take_patch(self.patch_model, number), self.tolerance
-            )
-        except PatchfemError as error:
-            self.batch.fail(number, error)
-            return
-        measures = fine.measures.values()
-        columns = [[one.value for one in measures], [one.error for one in measures]]
-        columns += [[one.floor for one in measures]]
-        values, errors, floors = np.array(columns, float)[:, :, None]
-        excess = np.array([max_mesh_error_ratio(fine.measures, self.tolerance)])
-        found = CaseMeasures(
-            tuple(fine.measures), values, errors, floors, excess, collect_facts(fine.pressed)
-        )
-        self.batch.put(np.array([number]), found)
-
-    def _solve_group(self, group: "_Group") -> np.ndarray:
-        """Solve cases on the meshes of a group; return the numbers of those that miss the tolerance, and can be divided.
-
-        Each further mesh halves the cells for the cases that miss the tolerance on the one before.
-        """
-        numbers = group.numbers
-        max_nodes = MAX_SHARED_NODES if numbers.size > 1 else np.inf
-        bodies = grids.make_grids(self.patch_model, group.layout)
-        places = group.places
-        series: list[MeshValues] = []
-        while True:
-            pair = condense(self.patch_model, *bodies, keep_factors=False)
-            is_judged = len(series) >= grids.MIN_NESTED_MESHES - 1
-            values, places, is_missing = self._press_parts(
-                numbers, pair, places, series, is_judged=is_judged
-            )
-            series = [*series, values]
-
-            bodies = [body.refine() for body in bodies]
-            is_last = bodies[0].x.size > max_nodes
-            is_last |= mesh_levels.is_too_expensive(self.patch_model, bodies)
-            if is_judged and (is_last or not is_missing.any()):
-                return numbers[is_missing] if group.numbers.size > 1 else numbers[:0]
-            numbers = numbers[is_missing]
-            series = [mesh.take(is_missing) for mesh in series]
-            places = places.take(is_missing)
 
     def solve_on_given_meshes(self) -> None:
         """Solve all cases on the meshes that the scene prescribes."""
-        numbers = np.arange(self.cases.n_cases)
-        places = None
-        series: list[MeshValues] = []
         levels = mesh_levels.make_given_meshes(self.patch_model)
-        for bodies in reversed(levels):
-            pair = condense(self.patch_model, *bodies, keep_factors=False)
-            is_judged = len(series) == len(levels) - 1
-            values, places, _ = self._press_parts(
-                numbers, pair, places, series, is_judged=is_judged
-            )
-            series = [*series, values]
+        numbers = np.arange(self.cases.n_cases)
+        self._refine(OpenCases(numbers, None, []), levels[-1], levels[-2::-1])
 
-    def _press_parts(
-        self, numbers: np.ndarray, pair: CondensedPair, places, series, *, is_judged: bool
-    ) -> PressedParts:
-        """Press cases on a mesh, in parts that limit the memory.
+    def _refine(self, cases: OpenCases, bodies, given=()) -> np.ndarray:
+        """Solve cases on nested meshes; return the numbers of those that miss the tolerance on the finest one.
+
+        Each further mesh halves the cells for the cases that miss the tolerance on the one before.
 
         Parameters
         ----------
-        numbers : (k,) ndarray
-            Numbers of the cases.
+        cases : OpenCases
+            The cases, without measures.
+        bodies : sequence
+            Coarsest meshes of the pieces.
+        given : sequence
+            Finer meshes if the scene prescribes them.
+        """
+        is_automatic = self.patch_model.mesh.is_automatic
+        n_unjudged = grids.MIN_NESTED_MESHES - 1 if is_automatic else len(given)
+        max_nodes = MAX_SHARED_NODES if cases.numbers.size > 1 else np.inf
+
+        def press(bodies, before: OpenCases | None) -> OpenCases:
+            """Press the cases that the meshes before have left."""
+            before = before or cases
+            pair = condense(self.patch_model, *bodies, keep_factors=False)
+            return self._press_parts(before, pair, is_judged=len(before.series) >= n_unjudged)
+
+        def judge(done: OpenCases, excesses: list[float]) -> Verdict:
+            """Return the next meshes, on which the cases that are left are solved."""
+            n_done = len(done.series)
+            if not is_automatic:
+                return Verdict(np.inf, given[n_done - 1] if n_done <= len(given) else None)
+            finer = [body.refine() for body in done.series[-1].pair.meshes if body is not None]
+            is_last = finer[0].x.size > max_nodes
+            is_last |= mesh_levels.is_too_expensive(self.patch_model, finer)
+            is_judged = n_done > n_unjudged
+            if not done.numbers.size or (is_judged and is_last):
+                return Verdict(self.batch.excess[done.numbers].max(initial=0.0))
+            return Verdict(np.inf, finer)
+
+        last, _ = refine(press, bodies, judge, NO_LIMIT)
+        return last.numbers
+
+    def _press_parts(self, before: OpenCases, pair: CondensedPair, *, is_judged: bool) -> OpenCases:
+        """Press cases on a mesh, in parts that limit the memory, and return those that go on.
+
+        Parameters
+        ----------
+        before : OpenCases
+            Cases with their contacts and measures on the meshes before.
         pair : CondensedPair
             Pieces on the mesh.
-        places : ContactPlaces or None
-            Contacts of the cases on the mesh before.
-        series : list of MeshValues
-            Measures of the cases on the meshes before, from coarse to fine.
         is_judged : bool
-            Whether the measures are kept with their errors.
-
-        Returns
-        -------
-        PressedParts
+            Whether the measures are kept with their errors, and only cases that miss the tolerance go on.
         """
+        numbers = before.numbers
         level = make_level(self.patch_model, pair)
-        is_missing = np.ones(numbers.size, bool)
-        values = []
-        found_places = []
+        goes_on = np.ones(numbers.size, bool)
+        parts = []
         for rows in _split_rows(numbers.size, level):
-            cases = self.cases.take(numbers[rows])
+            part = before.take(rows)
             start = np.zeros((rows.size, level.x.size), bool)
-            if places is not None:
-                start = places.take(rows).find_sets(level.x)
-            pressed, errors = press_on_level(level, cases, start)
-            values.append(collect_mesh_values(pressed))
-            found_places.append(find_contact_places(pressed))
+            if part.places is not None:
+                start = part.places.find_sets(level.x)
+            pressed, errors = press_on_level(level, self.cases.take(part.numbers), start)
+            values = collect_mesh_values(pressed)
             if is_judged:
-                own = [*(mesh.take(rows) for mesh in series), values[-1]]
-                is_missing[rows] = self._keep_measures(numbers[rows], pressed, own, errors)
-                for row in np.flatnonzero(is_missing[rows]):
-                    number = int(numbers[rows[row]])
+                series = [*part.series, values]
+                goes_on[rows] = self._keep_measures(part.numbers, pressed, series, errors)
+                for row in np.flatnonzero(goes_on[rows]):
+                    number = int(part.numbers[row])
                     self.contacts[number] = find_contact(self.patch_model, number, pressed, row)
             for row, error in errors.items():
-                is_missing[rows[row]] = False
-                self.batch.fail(int(numbers[rows[row]]), error)
+                goes_on[rows[row]] = False
+                self.batch.fail(int(part.numbers[row]), error)
+            parts.append((values, find_contact_places(pressed)))
             level.limit_sets(MAX_TABLE_SETS)
-        return PressedParts(join_mesh_values(values), join_places(found_places), is_missing)
+        values, places = zip(*parts)
+        series = [*before.series, join_mesh_values(values)]
+        return OpenCases(numbers, join_places(places), series).take(goes_on)
 
     def _keep_measures(self, numbers, pressed: PressedCases, series, errors) -> np.ndarray:
         """Estimate the errors of cases, and keep their measures; return whether they miss the tolerance (k,).
@@ -422,7 +385,7 @@ def _split_rows(count: int, level: Level) -> list[np.ndarray]:
     return np.split(np.arange(count), range(size, count, size))
 
 
-def join_mesh_values(parts: list[MeshValues]) -> MeshValues:
+def join_mesh_values(parts: Sequence[MeshValues]) -> MeshValues:
     """Return the measures of several parts of the cases on one mesh one after the other."""
     return MeshValues(
         parts[0].pair,

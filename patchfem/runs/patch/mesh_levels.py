@@ -6,11 +6,13 @@ expensive (`solve_on_refined_meshes`).
 """
 
 from functools import partial
+from math import inf
 
 from ...core import NotConverged, Outcome, PatchfemError
 from ...mesh import pieces as piece_meshes
 from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
+from ..refine import NO_LIMIT, Verdict, refine
 from . import area, profile_points, store
 from .condensed import CondensedPair, condense
 from .grids import (
@@ -201,66 +203,128 @@ def solve_on_refined_meshes(
     """
     solved = tuple(patch for patch in solved if patch is not None)
     if solved:
-        meshes = [mesh for mesh in solved[-1].pair.meshes if mesh is not None]
+        bodies = [mesh for mesh in solved[-1].pair.meshes if mesh is not None]
     else:
-        meshes = make_base_grids(patch_model).bodies
-    patches = ()
-    points = None
-    has_tried_points = False
-    n_finer = patch_model.mesh.n_finer
-    while True:
-        number = len(patches)
+        bodies = make_base_grids(patch_model).bodies
+    meshes = _PatchMeshes(patch_model, tolerance, solved)
+    if with_errors or solved:
+        patches, _ = refine(meshes.press, bodies, meshes.judge, NO_LIMIT)
+    else:
+        for _ in range(MIN_NESTED_MESHES - 1):
+            bodies = [body.refine() for body in bodies]
+        patches = (meshes.solve(bodies, None, keep_factors=True),)
+    if len(patches) < MIN_NESTED_MESHES:
+        missing = (MIN_NESTED_MESHES - len(patches)) * [None]
+        return with_static_measures((*patches, *missing), tolerance)
+    return patches
+
+
+class _PatchMeshes:
+    """Meshes of a single patch, for which `refine` is called.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch to solve.
+    tolerance : float
+        Relative error that the static measures have to meet.
+    solved : tuple of Patch
+        Patches of an earlier pass, from fine to coarse.
+    """
+
+    def __init__(self, patch_model, tolerance: float, solved: Patches):
+        self.patch_model = patch_model
+        self.tolerance = tolerance
+        self.solved = solved
+        self.n_finer = patch_model.mesh.n_finer
+        self.points = None
+        self.has_tried_points = False
+        self.is_done = False
+
+    def press(self, bodies, patches: Patches | None) -> Patches | None:
+        """Solve the patch on meshes, and estimate the errors of its measures from those before; None if this fails.
+
+        `patches` are those on the meshes before, from fine to coarse.
+        """
+        patches = patches or ()
         coarse = patches[0] if patches else None
-        patch = None
-        if number < len(solved):
-            patch = solved[-1 - number]
-        elif with_errors or number == MIN_NESTED_MESHES - 1:
-            # Only the last mesh needs factors, for the stress inside the pieces, which is computed on a coarser mesh if
-            # this one is expensive. The patches of many rigs do not keep them.
+        if len(patches) < len(self.solved):
+            patch = self.solved[-1 - len(patches)]
+        else:
+            # Only the last mesh needs factors
             if coarse is not None:
                 coarse.pair.forget_factors()
+            is_judged = len(patches) >= MIN_NESTED_MESHES - 1
             try:
-                keeps = patch_model.mesh.is_fine and number >= MIN_NESTED_MESHES - 1
-                keeps &= not is_too_expensive(patch_model, meshes)
-                pair = condense(patch_model, *meshes, keep_factors=keeps)
-                patch = solve_patch_contact(patch_model, pair, coarse=coarse)
+                patch = self.solve(bodies, coarse, keep_factors=is_judged)
             # The cells are too short for double precision, so that the finest mesh is left out.
             except NotConverged:
                 if coarse is None:
                     raise
-                return with_static_measures((*patches, *(2 - number) * [None]), tolerance)
-
+                return None
         patches = (patch, *patches)
-        meshes = [mesh.refine() for mesh in meshes]
         if len(patches) < MIN_NESTED_MESHES:
-            continue
-
-        # The solution on the points of the profile is used with all finer meshes.
-        patches = with_static_measures(patches, tolerance, points)
-        if not with_errors or patch.pressure.outcome is Outcome.NO_CONTACT:
             return patches
 
-        # Points replace a mesh that would take longer than those of a rig. Where they do not converge, they would not do
-        # so beside the next mesh either.
-        is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
-        if (
-            not (is_within or has_tried_points)
-            and predict_condensing_seconds(meshes) > COARSE_GRID_DENSITY.max_condensing_seconds
-            and profile_points.can_use_points(patch_model)
-        ):
-            has_tried_points = True
-            points = solved[0].points if solved else None
-            if points is None:
-                meets_tolerance = partial(_meets_tolerance, patches, tolerance)
-                points = profile_points.solve_on_points(patch_model, meets_tolerance)
-            patches = with_static_measures(patches, tolerance, points)
-
+        # The solution on the points of a profile is used with all finer meshes.
+        patches = with_static_measures(patches, self.tolerance, self.points)
+        self.is_done = max_mesh_error_ratio(patches[0].measures, self.tolerance) <= 1
+        if not (self.is_done or self.has_tried_points):
+            patches = self._use_points(patches)
         # The points do not determine a peak that may be at a free corner, but a finer mesh does.
-        is_done = is_within or (points is not None and "pressure_peak" in points.measures)
-        if is_done or is_too_expensive(patch_model, meshes):
-            if n_finer == 0:
-                return patches
-            n_finer -= 1
+        points = self.points
+        self.is_done |= points is not None and "pressure_peak" in points.measures
+        return patches
+
+    def solve(self, bodies, coarse: Patch | None, *, keep_factors: bool) -> Patch:
+        """Solve the patch on meshes; `coarse` is the patch on the meshes before, with whose contact the search starts.
+
+        Factors serve the stress inside the pieces, which is computed on a coarser mesh if this one is expensive. The patches
+        of many rigs do not keep them.
+        """
+        keep_factors &= self.patch_model.mesh.is_fine
+        keep_factors &= not is_too_expensive(self.patch_model, bodies)
+        pair = condense(self.patch_model, *bodies, keep_factors=keep_factors)
+        return solve_patch_contact(self.patch_model, pair, coarse=coarse)
+
+    def _use_points(self, patches: Patches) -> Patches:
+        """Return the patches with measures on the points of a profile, if the next mesh would take long.
+
+        Points replace a mesh that would take longer than those of a rig. Where they do not converge, they would not do so
+        beside the next mesh either.
+        """
+        finer = _halve_meshes(patches[0])
+        is_expensive = (
+            predict_condensing_seconds(finer) > COARSE_GRID_DENSITY.max_condensing_seconds
+        )
+        has_load = patches[0].pressure.outcome is not Outcome.NO_CONTACT
+        if not (is_expensive and has_load and profile_points.can_use_points(self.patch_model)):
+            return patches
+        self.has_tried_points = True
+        self.points = self.solved[0].points if self.solved else None
+        if self.points is None:
+            meets_tolerance = partial(_meets_tolerance, patches, self.tolerance)
+            self.points = profile_points.solve_on_points(self.patch_model, meets_tolerance)
+        return with_static_measures(patches, self.tolerance, self.points)
+
+    def judge(self, patches: Patches, excesses) -> Verdict:
+        """Decide whether a finer mesh follows; `patches` are solved, and `excesses` those of the meshes before."""
+        finer = _halve_meshes(patches[0])
+        if len(patches) < MIN_NESTED_MESHES:
+            return Verdict(inf, finer)
+        if patches[0].pressure.outcome is Outcome.NO_CONTACT:
+            return Verdict(0.0)
+        excess = max_mesh_error_ratio(patches[0].measures, self.tolerance)
+        if self.is_done or is_too_expensive(self.patch_model, finer):
+            if self.n_finer == 0:
+                return Verdict(excess)
+            self.n_finer -= 1
+        return Verdict(excess, finer)
+
+
+def _halve_meshes(patch: Patch) -> "list[piece_meshes.Mesh]":
+    """Return the meshes of a patch with cells half as long."""
+    return [mesh.refine() for mesh in patch.pair.meshes if mesh is not None]
 
 
 def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
@@ -307,8 +371,7 @@ def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
     tolerance : float
         The smaller tolerance.
     """
-    finer = [mesh.refine() for mesh in patches[0].pair.meshes if mesh is not None]
-    if is_too_expensive(patch_model, finer):
+    if is_too_expensive(patch_model, _halve_meshes(patches[0])):
         return False
     # Values are extrapolated where they miss the tolerance.
     patches = with_static_measures(patches, tolerance, patches[0].points)

@@ -10,8 +10,19 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Outcome, add_interface_number
+from ...effects import law_has_trait
 from ...formatting import format_length
 from .result import Finding, patch_surface
+
+
+def depends_on_pressure(keys, patch_model) -> bool:
+    """Return whether the motion of an interface follows from the pressure at each place, and not from its load alone.
+
+    It does if the patch slips part by part, if the lower piece has the pressure, and if the law averages the pressure.
+    `keys` are the effective keys of the law, and `patch_model` is the PatchModel of the interface.
+    """
+    is_fixed = patch_model.gap.side == "upper" and not law_has_trait(keys.law, "averaged")
+    return bool(patch_model.interface.partial_slip) or not is_fixed
 
 
 class Face(NamedTuple):
@@ -55,6 +66,11 @@ class Face(NamedTuple):
     def partial_slip(self) -> str:
         """Scene key that enables partial slip of the patch; "" if the patch slips as a whole."""
         return self.model.patch.interface.partial_slip
+
+    @property
+    def depends_on_pressure(self) -> bool:
+        """Whether the motion follows from the pressure at each place, so that it has an error due to the mesh."""
+        return depends_on_pressure(self.model.friction, self.model.patch)
 
     def slide(self, response) -> np.ndarray:
         """Return the relative displacement (k,) [m] of the interface in a Response."""

@@ -134,7 +134,7 @@ class RunInputs:
     def has_error_meshes(self) -> bool:
         """Whether each patch on whose mesh the motion depends is solved on a coarser mesh too."""
         depends = self.plan.model.motion_depends_on_mesh
-        moving = [face for face in self.faces if depends or face.partial_slip]
+        moving = [face for face in self.faces if depends or face.depends_on_pressure]
         return all(face.patches[1] is not None for face in moving)
 
 

@@ -38,8 +38,8 @@ MAX_UNCHECKED_TAIL_RATIO = 1e-2
 COMPARISON_TAIL_FACTOR = 0.1
 
 
-def list_time_runs(model: Model, numerics: Numerics) -> ComparisonRuns:
-    """List the comparison runs of a model that are coarser in time than the run with some Numerics.
+def list_time_runs(numerics: Numerics) -> ComparisonRuns:
+    """List the comparison runs that are coarser in time than the run with some Numerics.
 
     Time steps have runs with half and with a quarter of them, and the engine `hybrid` one with larger steps. The solver of
     steady motions estimates the errors of its steps itself.
@@ -126,8 +126,7 @@ def _list_mesh_runs(
     """List the comparison runs in which one patch of a model has coarser meshes: that of [contact], or of an interface.
 
     Interfaces with equal patches are coarsened together. The error is of second order for shear modes, and for an interface
-    that slips as a whole. The order of parallel elements, and of the cells of a face in time steps, is at least 1, and
-    shows on two coarser meshes in time steps.
+    that slips as a whole. The order of parallel elements, and of the cells of a face in time steps, is at least 1.
 
     Parameters
     ----------
@@ -142,29 +141,38 @@ def _list_mesh_runs(
     count : int or None
         Number of shear modes of the run; None without shear modes.
     """
-    friction = None if model.rig is None else model.rig.friction
-    has_soft_interface = friction is not None and friction.has_partial_slip
-    is_soft = bool(model.partial_slip) or has_soft_interface
-    is_below = model.side == "lower"
-    has_cells = model.patch is not None and model.patch.area is not None
-    rule = second_order_errors
-    n_meshes = 1
-    if is_below or (is_soft and count is None) or (has_cells and beside is not None):
-        rule = edge_errors if is_below else convergence_errors
-        n_meshes = 1 if beside is None else 2
-
-    coarser_runs = []
+    has_cells = model.patch is not None and model.patch.area is not None and beside is not None
     is_averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
+    coarser_runs = []
     if n_coarse and (model.motion_depends_on_mesh or is_averaged):
+        has_elements = bool(model.partial_slip) and count is None
+        rule = _choose_mesh_rule(model.side, has_elements=has_elements)
+        if has_cells and rule is second_order_errors:
+            rule = convergence_errors
+        # A second coarser mesh shows the order. The elements of a rig have one, as those between masses.
+        is_single = rule is second_order_errors or (has_elements and model.rig is not None)
+        n_meshes = 1 if is_single or beside is None else 2
         levels = range(1, 1 + min(n_coarse, n_meshes))
         modes = numerics.shear_modes if count is None else count
         runs = tuple(replace(numerics, coarse_patch=k, shear_modes=modes) for k in levels)
         coarser_runs.append(CoarserRuns(runs, rule, beside, "mesh"))
-    if has_soft_interface:
-        for interfaces in faces.group_interfaces_with_coarse_mesh(model):
-            coarse = replace(numerics, meshed=interfaces)
-            coarser_runs.append(CoarserRuns((coarse,), rule, beside, "mesh"))
+    # The module of interfaces with patches is loaded only for them.
+    groups = faces.group_interfaces_with_coarse_mesh(model) if model.has_interface_patches else []
+    for interfaces in groups:
+        interface = model.rig.friction.interfaces[interfaces[0]]
+        rule = _choose_mesh_rule(
+            interface.patch.gap.side, has_elements=bool(interface.partial_slip) and count is None
+        )
+        coarse = replace(numerics, meshed=interfaces)
+        coarser_runs.append(CoarserRuns((coarse,), rule, beside, "mesh"))
     return coarser_runs
+
+
+def _choose_mesh_rule(side: str, *, has_elements: bool):
+    """Return the rule of the error by the mesh of an interface, whose piece on a `side` has the pressure."""
+    if side == "lower":
+        return edge_errors
+    return convergence_errors if has_elements else second_order_errors
 
 
 def _list_bond_sum_runs(

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...contact import contact_sets
-from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega
 from ...time_steps import laws
@@ -24,7 +23,6 @@ from ..bench.contact_points import (
     make_points,
     place_surface,
 )
-from ..patch import faces
 from . import bands, bond_lists, joints
 
 
@@ -113,60 +111,43 @@ def _list_element_joints(model: Model, numerics, patch) -> list[joints.Joint]:
 
     Bands that yaw deform the same pieces, so that their elements are not parallel.
     """
-    interfaces = model.rig.friction.interfaces
-    if model.rig.friction.bands_slide_apart:
+    parts = joints.list_loaded_interfaces(model, patch, numerics.meshed)
+    patches = [part.patch for part in parts if part.patch is not None]
+    is_below = any(solved.model.gap.side == "lower" for solved in patches)
+    if is_below or model.rig.friction.bands_slide_apart:
         return []
-    patches = [model.patch, *(interface.patch for interface in interfaces)]
-    if any(part is not None and part.gap.side == "lower" for part in patches):
-        return []
-    is_soft = [model.partial_slip or interface.partial_slip for interface in interfaces]
-    keys = [model.friction if patch is not None else interface.numbers for interface in interfaces]
-    soft_keys = [law for law, soft in zip(keys, is_soft) if soft]
-    if not soft_keys or not all(joints.has_elements(law) for law in soft_keys):
+    soft_keys = [part.keys for part in parts if part.is_soft]
+    if not soft_keys or not all(map(joints.has_elements, soft_keys)):
         return []
     return joints.list_joints(model, patch, numerics.meshed)
 
 
 def _list_surfaces(model: Model, numerics, patch) -> list[Surface]:
     """Return the interfaces of a rig, or the bands of its face that slide apart."""
-    rig = model.rig
-    rows = rig.modes.interfaces
-    if patch is not None:
-        keys = model.friction
-        limits = averaged_law.find_loads(keys, patch)
-        total = float(patch.pressure.load)
-        force = patch.pressure.sigma_n * patch.pieces.interface.weight
-        soft = patch if model.partial_slip else None
-        if rig.friction.bands_slide_apart and not model.partial_slip:
-            pairs = zip(bands.compute_band_loads(patch), rows)
-            parts = [Surface(keys, total, np.array([load]), None, row) for load, row in pairs]
-            if limits is not None:
-                sums = [bands.sum_bands(patch, loads) for loads in limits]
-                parts = [
-                    part._replace(limits=np.reshape(pair, (2, 1)))
-                    for part, *pair in zip(parts, *sums)
-                ]
-            return parts
-        surface = Surface(keys, total, force, soft, rows[0], limits=limits)
-        return [place_surface(model, patch, surface)]
-
-    # Between masses only a patch whose shape matters to the motion is pressed; any other is a point.
+    rows = model.rig.modes.interfaces
     surfaces = []
-    for k, interface in enumerate(rig.friction.interfaces):
-        load = model.point.load if interface.load is None else interface.load
-        force = np.array([load])
-        keys = interface.numbers
-        own = None
-        if interface.patch is not None and (
-            interface.partial_slip
-            or interface.patch.gap.side == "lower"
-            or law_has_trait(keys.law, "averaged")
-        ):
-            solved = faces.solve_contact_on_meshes(interface, model.accuracy.tolerance)
-            own = solved[int(k in numerics.meshed)]
+    for part, row in zip(joints.list_loaded_interfaces(model, patch, numerics.meshed), rows):
+        own = part.patch
+        force = np.array([part.load.mean])
+        if own is not None:
             force = own.pressure.sigma_n * own.pieces.interface.weight
-        limits = averaged_law.find_loads(keys, own)
-        soft = own if interface.partial_slip else None
-        surface = Surface(keys, load, force, soft, rows[k], limits=limits)
+        limits = averaged_law.find_loads(part.keys, own)
+        soft = own if part.is_soft else None
+        surface = Surface(part.keys, part.load.mean, force, soft, row, limits=limits)
+        if model.rig.friction.bands_slide_apart and not part.is_soft:
+            return _list_bands(own, surface, rows)
         surfaces.append(place_surface(model, own, surface))
     return surfaces
+
+
+def _list_bands(patch, surface: Surface, rows) -> list[Surface]:
+    """Return the bands of a face, with a row (n,) of `rows` each, that slide apart as wholes."""
+    loads = bands.compute_band_loads(patch)
+    limits = [None] * len(rows)
+    if surface.limits is not None:
+        sums = [bands.sum_bands(patch, side) for side in surface.limits]
+        limits = np.transpose(sums)[:, :, None]
+    return [
+        surface._replace(force=np.array([load]), row=row, limits=limit)
+        for load, row, limit in zip(loads, rows, limits)
+    ]

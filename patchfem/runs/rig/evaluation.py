@@ -8,11 +8,12 @@ level: there is a `Level` with errors for each of them, the onset level found by
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ... import friction, structure
+from ...convergence import MAX_CONVERGENCE_ORDER, convergence_error
 from ...core import Measure, Outcome, Response, SineDrive
 from ...cost_model import measure_cpu_time
 from ...effects import law_has_trait
@@ -41,8 +42,6 @@ Fields = dict[str, Any]  # fields of a record by name
 # Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
 ESCAPE_DISPLACEMENT_RATIO = 2.0
 NO_PEAK_REASON = "the output does not move at any of the swept frequencies, so there is no peak"
-# Safety factor on the change of a peak frequency in a coarse run.
-PEAK_SHIFT_SAFETY_FACTOR = 3.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -236,7 +235,7 @@ def compute_peak_frequency(solution: Solution, coarser=()) -> Measures:
     peak_frequency = float(solution.drive.omega / (2 * np.pi))
     peaks = [run.drive.omega / (2 * np.pi) for run in coarser if run.drive is not None]
     shift = float(np.abs(np.array(peaks) - peak_frequency).max(initial=0.0))
-    error = solution.peak_error + PEAK_SHIFT_SAFETY_FACTOR * shift
+    error = solution.peak_error + convergence_error(shift)
     return {"peak_frequency": Measure(peak_frequency, "Hz", error, 0.0)}
 
 
@@ -278,19 +277,10 @@ def add_level_errors(
     return tuple(levels_with_errors)
 
 
-class Onset(NamedTuple):
-    """Drive level of an onset, which lies between two levels of a bisection.
-
-    - level: mean of both levels [m s-2].
-    - error: half their difference [m s-2].
-    """
-
-    level: float
-    error: float
-
-
-def find_onset(drive_levels, run_level, tolerance: float, is_past_onset) -> Onset | None:
-    """Find the drive level [m s-2] of the onset by bisection, with its uncertainty; None if no level reaches the onset.
+def find_onset(
+    drive_levels, run_level, tolerance: float, is_past_onset
+) -> tuple[float, float] | None:
+    """Find the drive level of the onset by bisection, with its uncertainty, both [m s-2]; None if no level reaches it.
 
     The bisection starts between the last level before the onset and the first level after it, and
     ends when the bracket is smaller than `tolerance` times the level. If there is no level before
@@ -323,7 +313,7 @@ def find_onset(drive_levels, run_level, tolerance: float, is_past_onset) -> Onse
             high = middle
         else:
             low = middle
-    return Onset((low + high) / 2, (high - low) / 2)
+    return (low + high) / 2, (high - low) / 2
 
 
 def measure_onset_level(rig, solution, tolerance: float) -> Measure:
@@ -341,7 +331,7 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
     unit, factor = _find_level_unit(rig)
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
 
-    def find(run) -> Onset | None:
+    def find(run) -> tuple[float, float] | None:
         """Return the onset of slip in a run with drive levels, or None if no level reaches it."""
         return find_onset(run.levels, run.run_level, tolerance, is_past_onset)
 
@@ -354,7 +344,8 @@ def measure_onset_level(rig, solution, tolerance: float) -> Measure:
         coarse_onset = find(run)
         reference = onset if beside is None else find(beside)
         is_missing = coarse_onset is None or reference is None
-        error += level if is_missing else abs(coarse_onset.level - reference.level)
+        change = level if is_missing else coarse_onset[0] - reference[0]
+        error += convergence_error(change, order=MAX_CONVERGENCE_ORDER)
     return Measure(factor * level, unit, factor * error, 1e-9)
 
 
@@ -641,7 +632,7 @@ class RunEvaluator:
         stuck = self.is_stuck(run)
         values = self.evaluate_measures(run, drive, run.response.extra.get("ledger"), stuck=stuck)
         fields = {"message": run.message, "log": run.log, "snapshots": run.snapshots}
-        fields |= self.collect_solution_fields(run, drive)
+        fields |= self.collect_solution_fields(run)
 
         # Without an early end, the outcome stays open until the errors are known.
         return Solution(

@@ -32,6 +32,7 @@ from ...response.measures import Values
 from ...response.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
+from ..bench.masing import find_stretches
 from . import bands, engines
 from .evaluation import (
     EngineRun,
@@ -325,21 +326,9 @@ class LumpedEvaluator(RunEvaluator):
         at = np.searchsorted(histories.time, times)
         states = []
         for i, (_, limit) in enumerate(self.joints.elements):
-            # Between two turns of the slide all elements move alike, so that the turns determine their stretches.
-            slide = histories.slides[:, i]
-            directions = np.sign(np.diff(slide))
-            turns = 1 + np.flatnonzero(directions[1:] != directions[:-1])
-            points = np.union1d(turns, np.append(0, at))
             remembered = [] if start is None else _list_remembered_slides(start, i)
-            path = np.append(remembered, slide[points])
-
-            stretch = np.zeros(np.shape(limit))
-            found = {}
-            for k, step in enumerate(np.diff(path, prepend=path[0]), -len(remembered)):
-                stretch = np.clip(stretch + step, -limit, limit)
-                if k >= 0 and points[k] in at:
-                    found[points[k]] = stretch
-            states.append([(float(slide[k]), found[k]) for k in at])
+            path = np.append(remembered, histories.slides[:, i])
+            states.append(find_stretches(limit, path, at + len(remembered)))
         return [ElementSnapshot(float(time), faces) for time, *faces in zip(times, *states)]
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
@@ -419,7 +408,7 @@ class LumpedEvaluator(RunEvaluator):
                 errors[name] = error + row.sample_error / LATE_SAMPLES_PER_CYCLE
         return errors
 
-    def collect_solution_fields(self, run, drive) -> Fields:
+    def collect_solution_fields(self, run) -> Fields:
         """Return the free vibration that remains after the last slip of a release, by the name of its field in `Solution`.
 
         No interface slips any more, so that the rig is linear. The dict is empty for other drives and nonlinear springs.

@@ -10,10 +10,13 @@ from ... import friction, slip
 from ...effects import law_has_trait, needs_bond_list
 from ..bench import averaged_law
 from ..bench import shear as bench_shear
+from ..patch import jenkins_elements
+from ..results.interfaces import Face
 from ..results.patch_rows import Arrays
 from ..results.result import (
     N_INTERFACE_FRAMES,
     SlipRule,
+    collect_rest_frame,
     compute_status,
     make_interface_frames,
 )
@@ -58,7 +61,6 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         is_below = model.side == "lower" and model.grooves is None and not needs_bond_list(f)
         has_nodes = is_below or (has_shear and solution.contact.elements is None)
 
-    rule = SlipRule()
     if has_nodes or (has_shear and model.grooves is not None):
         tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
@@ -67,16 +69,74 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
             0.0 if reduction is None else friction.record.make_law(f, patch.pressure.load).length
         )
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
-        tau, local = slip.fields.compute_element_fields(patch, reduction, states, length)
-        if model.patch.area is None:
-            rule = SlipRule(f.static * sigma)
+        return _make_element_frames(
+            patch, f.static, (reduction, length), list_frames("time"), states
+        )
     else:
         force = list_frames("force")
         tau = np.outer(force / patch.pressure.load, sigma)
         if f is not None and law_has_trait(f.law, "averaged"):
             tau = averaged_law.distribute_slip_force(f, patch, force, np.zeros(force.size))
         local = np.repeat(list_frames("slip")[:, None], sigma.size, axis=1)
+    rule = SlipRule()
     return make_interface_frames(patch, list_frames("time"), tau, local, list_frames("slide"), rule)
+
+
+def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ...]:
+    """Return interfaces of a rig with frames of their slip and shear stress.
+
+    Without elements or snapshots, an interface has only the fields of its static contact.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the rig.
+    faces : tuple of Face
+        Pressed interfaces of the rig, in their order.
+    snapshots : list
+        States of the event-driven engine: time [s], and for each interface its slide [m] and the
+        stretch (t,) [m] of its elements.
+    """
+    out = []
+    for face in faces:
+        law = model.rig.friction.interfaces[face.number]
+        fields = collect_rest_frame(face.patch)
+
+        # Only an interface whose pieces deform in shear has slip that varies along x.
+        if face.partial_slip and snapshots:
+            static = law.numbers.static
+            length = friction.record.make_law(law.numbers, law.load).length
+            found = jenkins_elements.make_elements(face.patch, static, length).jenkins_set
+            if found is not None:
+                states = [snapshot.faces[face.number] for snapshot in snapshots]
+                time = np.array([snapshot.time for snapshot in snapshots])
+                fields = _make_element_frames(face.patch, static, (found, length), time, states)
+        out.append(face._replace(fields=fields))
+    return tuple(out)
+
+
+def _make_element_frames(patch, static: float, elements: tuple, time, states) -> Arrays:
+    """Return the fields of an interface whose pieces deform in shear, from the stretches of its parallel elements.
+
+    Parameters
+    ----------
+    patch : Patch
+        Solved patch.
+    static : float
+        Coefficient of static friction.
+    elements : tuple
+        JenkinsSet, and the length [m] of the bonds in series with it.
+    time : (f,) array
+        Times of the frames [s].
+    states : list of tuple
+        Slide [m] and stretches (t,) [m] in each frame.
+    """
+    reduction, length = elements
+    tau, local = slip.fields.compute_element_fields(patch, reduction, states, length)
+    # The tractions of the cells of a face are interpolated, so that they do not reach their limits exactly.
+    limit = None if patch.model.area is not None else static * patch.pressure.sigma_n
+    slide = np.array([slide for slide, _ in states])
+    return make_interface_frames(patch, time, tau, local, slide, SlipRule(limit))
 
 
 def _collect_varying_load_fields(patch, solution) -> Arrays:

@@ -47,22 +47,11 @@ RIGID_FRICTION_REASON = (
 )
 
 
-class Flutter(NamedTuple):
-    """Largest unstable limit cycle of a rig.
-
-    - measures: its amplitude by the name of the measure, or the reason of its absence
-    - notes: sentences on what was found
-    """
-
-    measures: Measures
-    notes: list[str]
-
-
-def compute_flutter_amplitude(run) -> Flutter:
+def compute_flutter_amplitude(run) -> tuple[Measures, list[str]]:
     """Compute the amplitude above which friction does not limit a mode with negative damping, so that a motion grows.
 
     It is the amplitude of the largest unstable limit cycle. `run` is the `rig.CoupledRun` of the rig. Without an unstable
-    cycle the measure has a reason instead of a value.
+    cycle the measure has a reason instead of a value. The second value is a list of sentences on what was found.
     """
     model = run.model
     unit = MOTION_TABLE[FLUTTER_MEASURE].unit
@@ -81,7 +70,7 @@ def compute_flutter_amplitude(run) -> Flutter:
     unstable_cycles = [cycle for cycle in cycles if not cycle.is_stable]
     if not unstable_cycles:
         missing = Measure(None, unit, None, floor, reason=reason)
-        return Flutter({FLUTTER_MEASURE: missing}, end_notes)
+        return {FLUTTER_MEASURE: missing}, end_notes
     limit = unstable_cycles[-1]
 
     # Motions below the unstable cycle approach the largest stable one inside it, or decay.
@@ -110,7 +99,7 @@ def compute_flutter_amplitude(run) -> Flutter:
         f"{decay_text}, and a free oscillation of larger amplitude grows",
         *end_notes,
     ]
-    return Flutter({FLUTTER_MEASURE: measure}, notes)
+    return {FLUTTER_MEASURE: measure}, notes
 
 
 class LimitCycles(NamedTuple):

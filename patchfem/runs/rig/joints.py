@@ -22,6 +22,7 @@ from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
 from ..bench import averaged_law
 from ..patch import faces, jenkins_elements
+from ..results.interfaces import depends_on_pressure
 from . import bands, bond_lists
 from .engines import Numerics
 
@@ -124,6 +125,51 @@ class Joints(NamedTuple):
         return np.array([_find_spring_stiffness(law) for law, _ in self.laws])
 
 
+class LoadedInterface(NamedTuple):
+    """Interface of a rig under its load.
+
+    - keys: effective keys of the friction law.
+    - load: normal load, which may oscillate.
+    - patch: solved Patch, if the motion depends on its pressure; None for a point.
+    - is_soft: whether the patch slips part by part.
+    """
+
+    keys: object
+    load: Load
+    patch: object
+    is_soft: bool
+
+
+def list_loaded_interfaces(model: Model, patch, meshed=()) -> list[LoadedInterface]:
+    """Return the interfaces of a rig with their laws and loads, or [] without friction.
+
+    Parameters
+    ----------
+    model : Model
+        Rig with its interfaces.
+    patch : Patch or None
+        Patch of [contact]; None under [normal] and between masses.
+    meshed : tuple of int
+        Indices of the interfaces whose patches have a coarser mesh.
+    """
+    interfaces = model.rig.friction.interfaces
+    if patch is not None and interfaces:
+        load = Load(float(patch.pressure.load))
+        return [LoadedInterface(model.friction, load, patch, bool(model.partial_slip))]
+    parts = []
+    for k, interface in enumerate(interfaces):
+        load = interface.load
+        load = _make_point_load(model.point) if load is None else Load(load)
+        keys = interface.numbers
+        own = None
+        # Between masses only a patch whose shape matters to the motion is pressed; any other is a point.
+        if interface.patch is not None and depends_on_pressure(keys, interface.patch):
+            solved = faces.solve_contact_on_meshes(interface, model.accuracy.tolerance)
+            own = solved[int(k in meshed)]
+        parts.append(LoadedInterface(keys, load, own, bool(interface.partial_slip)))
+    return parts
+
+
 def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     """Return the interfaces of a rig, or the bands of its face that slide apart, or [] without friction.
 
@@ -136,25 +182,12 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     meshed : tuple of int
         Indices of the interfaces whose patches have a coarser mesh.
     """
-    friction = model.rig.friction
     speed = model.rig.slide_speed_scale
-    if not friction.interfaces:
-        return []
-    if patch is not None:
-        law = replace_averaged_law(model.friction, patch)
-        contact_load = float(patch.pressure.load)
-        parts = _list_patch_parts(model, patch)
-        return [Joint(law, load, speed, contact_load, *elements) for load, elements in parts]
-
     joints = []
-    for k, interface in enumerate(friction.interfaces):
-        load = interface.load
-        load = _make_point_load(model.point) if load is None else Load(load)
-        parts = ()
-        if interface.partial_slip and has_elements(interface.numbers):
-            parts = faces.make_patch_elements(interface, model.accuracy.tolerance, k in meshed)
-        law = replace_averaged_law(interface.numbers, None)
-        joints.append(Joint(law, load, speed, load.mean, *parts))
+    for part in list_loaded_interfaces(model, patch, meshed):
+        law = replace_averaged_law(part.keys, part.patch)
+        for load, elements in _list_parts(model, part):
+            joints.append(Joint(law, load, speed, part.load.mean, *elements))
     return joints
 
 
@@ -192,19 +225,18 @@ def _make_point_load(point) -> Load:
     return Load(point.load, point.amplitude, 2 * np.pi * (point.frequency or 0.0), point.phase)
 
 
-def _list_patch_parts(model: Model, patch) -> list[tuple[Load, tuple]]:
-    """Return pairs of load and elements: one of the patch in [contact], or one of each band if the bands slide apart.
+def _list_parts(model: Model, part: LoadedInterface) -> list[tuple[Load, tuple]]:
+    """Return pairs of load and elements: one of the interface, or one of each band of its face if the bands slide apart.
 
     The elements are those of a patch that slips node by node, as the last fields of a Joint: stiffness, yield
     displacement and JenkinsSet. They are () for a patch that slips as a whole.
     """
     if model.rig.friction.bands_slide_apart:
-        return [(Load(float(load)), ()) for load in bands.compute_band_loads(patch)]
-    load = Load(float(patch.pressure.load))
-    if not (model.partial_slip and has_elements(model.friction)):
-        return [(load, ())]
-    length = friction.record.make_law(model.friction, load.mean).length
-    return [(load, jenkins_elements.make_elements(patch, model.friction.static, length))]
+        return [(Load(float(load)), ()) for load in bands.compute_band_loads(part.patch)]
+    if not (part.is_soft and has_elements(part.keys)):
+        return [(part.load, ())]
+    length = friction.record.make_law(part.keys, part.load.mean).length
+    return [(part.load, jenkins_elements.make_elements(part.patch, part.keys.static, length))]
 
 
 # ---- engine `hybrid`
@@ -305,11 +337,11 @@ def make_undriven_rig(model: Model, numerics: Numerics, patch) -> UndrivenRig:
     """
     rig = model.rig
     joints = list_joints(model, patch, numerics.meshed)
-    is_soft = [model.partial_slip] * len(joints)
-    if patch is None:
-        is_soft = [interface.partial_slip for interface in rig.friction.interfaces]
-    for joint, soft in zip(joints, is_soft):
-        if soft and joint.stiffness is None:
+    is_soft = bool(model.partial_slip)
+    for number, joint in enumerate(joints):
+        if patch is None:
+            is_soft = rig.friction.interfaces[number].partial_slip
+        if is_soft and joint.stiffness is None:
             raise PatchfemError(NO_SOFT_LOOP)
         has_bonds = joint.stiffness is None and law_has_trait(joint.law.law, "bonds")
         if has_bonds and joint.law.rest_growth is not None:

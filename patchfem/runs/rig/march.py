@@ -114,7 +114,7 @@ class MarchEvaluator(RunEvaluator):
         force = run.window.force
         return replace(run, step_force=(force[1:] + force[:-1]) / 2)
 
-    def collect_solution_fields(self, run, drive) -> Fields:
+    def collect_solution_fields(self, run) -> Fields:
         """Return {"bond_summation": method by which the bonds were summed}, or {} for a law without bonds."""
         interfaces = self.model.rig.friction.interfaces
         if not any(law_has_trait(interface.numbers.law, "bonds") for interface in interfaces):

@@ -8,7 +8,6 @@ are in `results.notes`.
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 
@@ -44,26 +43,18 @@ SINGLE_POINT_WARNING = (
 )
 
 
-class Remarks(NamedTuple):
-    """What a user should know about a run.
+def collect_remarks(run) -> tuple[list[str], list[str]]:
+    """Return the warnings and the notes of a run on its friction law, load, engine and end of motion.
 
-    - warnings: sentences on numbers that may be wrong
-    - notes: sentences on what the model leaves out or assumes
+    Warnings are sentences on numbers that may be wrong, and notes on what the model leaves out or assumes.
     """
-
-    warnings: list[str]
-    notes: list[str]
-
-
-def collect_remarks(run) -> Remarks:
-    """Return the warnings and notes of a run on its friction law, load, engine and end of motion."""
     is_bench = run.model.rig is None
     warnings = SLIDE_WARNINGS if is_bench else MOTION_WARNINGS
     notes = LAW_NOTES if is_bench else MOTION_NOTES
-    return Remarks(
-        list(chain.from_iterable(find(run) for find in warnings)),
-        list(chain.from_iterable(find(run) for find in notes)),
-    )
+    sentences = [
+        list(chain.from_iterable(find(run) for find in table)) for table in (warnings, notes)
+    ]
+    return sentences[0], sentences[1]
 
 
 def _warn_of_single_points(run) -> list[str]:

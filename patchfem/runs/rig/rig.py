@@ -30,9 +30,8 @@ from ...response.rows import set_final_floors
 from ...response.settling import slip_period
 from .. import refine
 from ..bench import bench
-from ..patch import faces
 from ..results.interfaces import check_pieces_overlap
-from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, Settings
+from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, Settings, Shortage
 from . import bond_lists, comparisons, decays, event_to_event, flutter, march, slides
 from . import fields as interface_fields
 from .engines import (
@@ -361,7 +360,7 @@ def _make_result(run: CoupledRun) -> Result:
             for frame in solution.snapshots
             if isinstance(frame, event_to_event.ElementSnapshot)
         ]
-        moved = faces.add_slip_fields(model, inputs.faces, snapshots)
+        moved = interface_fields.add_slip_fields(model, inputs.faces, snapshots)
 
     return Result(
         plan=inputs.plan,
@@ -401,12 +400,12 @@ def estimate_slide_errors(model, patches, run: "bench.BenchRun", steps: int) -> 
     """
     solution = slides.make_slide_solution(run)
     numerics = Numerics(BENCH.name, steps, model.slide.cycles, 1, None, run.engine.choice)
-    runs = comparisons.list_time_runs(model, numerics)
+    runs = comparisons.list_time_runs(numerics)
     runs += comparisons.list_space_runs(model, numerics, patches[0], len(patches) - 1, solution)
     return Runner(model, patches).estimate_errors(runs, solution)
 
 
-def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[CoupledRun]:
+def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shortage | None]:
     """Repeat a run with finer settings until the errors of its measures meet the tolerance.
 
     Only settings that the scene does not fix are refined. All coarse runs are stored in
@@ -442,7 +441,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
         first = runner.solve(numerics, inputs.say)
     if not inputs.estimate or first.outcome is Outcome.NOT_CONVERGED:
         measures = add_errors(first.values, size=size) | compute_peak_frequency(first)
-        return refine.Refined(CoupledRun(inputs, numerics, first, measures))
+        return CoupledRun(inputs, numerics, first, measures), None
 
     # Comparison runs on coarser meshes, with other modes and with other joints; more steps do not repeat them.
     space_runs = comparisons.list_space_runs(model, numerics, inputs.patch, inputs.n_coarse, first)
@@ -460,7 +459,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
             runner.solutions[coarser.numerics] = coarser.solution
             solution = runner.solve(numerics, inputs.say)
             inputs.seconds[stage] = solution.seconds
-        time_runs = comparisons.list_time_runs(model, numerics)
+        time_runs = comparisons.list_time_runs(numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
         step_runs = list_step_runs(numerics.steps, solution, time_runs, runner.solutions)
         measures = add_errors(
@@ -474,7 +473,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> refine.Refined[Coupled
     run, shortage = refine.refine(solve, numerics, _judge, inputs.limit)
     inputs.seconds["error"] = sum(solution.seconds for solution in runner.solutions.values())
     peak = compute_peak_frequency(run.solution, runner.solutions.values())
-    return refine.Refined(replace(run, measures=run.measures | peak), shortage)
+    return replace(run, measures=run.measures | peak), shortage
 
 
 def _count_slip_period_cycles(model, numerics, solution) -> int:
