@@ -123,10 +123,8 @@ def replace_numbers(
         if "normal" in tables:
             changes["point"] = build_point_load(scene)
         if model.friction is not None and tables & {"friction", "normal", "contact"}:
-            changes["friction"] = scene.friction
-            interfaces = tuple(
-                replace(one, numbers=scene.friction) for one in rig.friction.interfaces
-            )
+            law = changes["friction"] = scene.friction
+            interfaces = tuple(replace(one, numbers=law) for one in rig.friction.interfaces)
             rig = replace(rig, friction=replace(rig.friction, interfaces=interfaces))
         if "drive" in tables:
             rig = replace(rig, drive=build_drive(scene, rig.modes))

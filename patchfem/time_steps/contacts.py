@@ -68,7 +68,7 @@ class PointSet:
     bond_sum: BondSum | None = None
     shares_shear: bool = False
 
-    def split(self, numbers: np.ndarray, rows: np.ndarray) -> "list[PointSet]":
+    def divide(self, numbers: np.ndarray, rows: np.ndarray) -> "list[PointSet]":
         """Return the set divided among ports, whose points deform the same pieces.
 
         Parameters

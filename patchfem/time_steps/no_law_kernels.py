@@ -6,4 +6,14 @@ from ..compiled.jit import njit
 
 @njit(**NJIT_CALL)
 def slide(numbers, memory, trial, values, count, step):
-    """Leave the points as they are; the package describes the arguments (`time_steps`)."""
+    """Leave a block of points as it is.
+
+    Parameters
+    ----------
+    numbers, memory, trial, values : (k,) array
+        Rows of the block.
+    count : int
+        Number of points.
+    step : Step
+        Duration and formula of the velocity.
+    """

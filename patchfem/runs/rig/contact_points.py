@@ -71,7 +71,7 @@ def make_contact(model: Model, numerics, patch):
             count = numerics.shear_modes
             sets = [make_points(model, part, count, moves=moves) for part in surfaces]
             if rig.friction.bands_slide_apart and model.partial_slip:
-                sets = sets[0].split(bands.number_bands(patch)[sets[0].shear.points], rows)
+                sets = sets[0].divide(bands.number_bands(patch)[sets[0].shear.points], rows)
 
     # Without friction the drive gives the scale of the forces.
     limit = sum(float(point_set.law.limits.sum()) for point_set in sets)

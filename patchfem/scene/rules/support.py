@@ -181,7 +181,7 @@ class Feature(NamedTuple):
     key: str = ""
     words: str = ""
 
-    def is_in(self, joint: Joint) -> bool:
+    def describes(self, joint: Joint) -> bool:
         """Return whether a joint has the feature."""
         name = self.is_there
         return bool(getattr(joint, name) if isinstance(name, str) else name(joint))
@@ -270,7 +270,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
         joints.append(Joint(draft, f"structure.interface.{index}", table, table.contact, kind))
     for joint in joints:
         # Many rows name the same feature, which is looked for only once.
-        is_there = cache(lambda name, joint=joint: find_feature(name).is_in(joint))
+        is_there = cache(lambda name, joint=joint: find_feature(name).describes(joint))
         reported: set[str] = set()  # one mistake for each key is enough
         for names, instead in UNSUPPORTED_COMBINATIONS:
             first, *others = names.split(", ")
