@@ -267,12 +267,6 @@ class MotionCurve(ExtendedShooting):
         """Return the arc length of a Newton step, relative to MAX_CORRECTION."""
         return float(np.linalg.norm(step[: self.n] / self.size / self.unit)) / MAX_CORRECTION
 
-    def scales(self) -> np.ndarray:
-        """Return the magnitudes (n,) of modes, law states and parameter."""
-        scale = super().scales()
-        scale[self.extra] = self.width
-        return scale
-
     def read_w(self, state: State) -> np.ndarray:
         """Return the scaled unknowns and the parameter (N + 1,) of a state."""
         return state.y[: self.n] / self.size

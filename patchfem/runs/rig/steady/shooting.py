@@ -55,7 +55,6 @@ RTOL = 1e-11  # tolerance of a step, so that the change over a period is far bel
 STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
-N_NEAR_CYCLES = 1  # cycles before the first correction of a motion that starts from a similar one
 MAX_BRACKET_STEPS = (
     8  # steps, each twice as long as the one before, beyond which no maximum is looked for
 )
@@ -135,7 +134,7 @@ class ShootingFinder:
             motion = periodic.find_periodic_motion(
                 case,
                 start=guess and guess.run.final,
-                n_first=periodic.N_FIRST_CYCLES if guess is None else N_NEAR_CYCLES,
+                n_first=periodic.N_FIRST_CYCLES if guess is None else 1,
                 has_kinks=self.joints.has_kinks,
                 is_undamped=is_undamped,
             )
