@@ -97,7 +97,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
         COULOMB_RIG,
         "hybrid.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.drives "
-        "hybrid.free_motions hybrid.continuation hybrid.periodic_curves "
+        "hybrid.free_motions hybrid.periodic_curves "
         "time_steps runs.rig.steady " + " ".join(RIG_KEYS),
     ),
     **{

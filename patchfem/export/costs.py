@@ -1,7 +1,6 @@
 """The answer of `cost`: numerical error against CPU time, for several tolerances or values of a setting."""
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 from ..campaigns import convergence
@@ -30,9 +29,8 @@ from .answer import (
     Variables,
     encode_texts,
     make_columns,
-    to_plain,
 )
-from .rows import make_variables
+from .rows import make_details, make_variables
 from .runs import make_origin
 
 # Tolerances for which a convergence table names the coarsest sufficient setting, by the name of their column
@@ -131,15 +129,13 @@ def describe_run(row: Row) -> JsonObject:
     It has the attributes of the `Cost`, `values`, `errors` and `floors` of its measures, `worst` {`measure`, `error`} and
     `meets_tolerance`.
     """
-    measures = row.run.measures
-    content = to_plain(replace(row.run, measures={}))
-    del content["measures"]
-    content["worst"] = {"measure": row.worst.name, "error": row.worst.fraction}
-    content["meets_tolerance"] = row.judgement is Judgement.MEETS
+    parts = {}
     for part in ("value", "error", "floor"):
-        numbers = {name: getattr(one, part) for name, one in measures.items()}
-        content[f"{part}s"] = {name: one for name, one in numbers.items() if one is not None}
-    return content
+        numbers = {name: getattr(one, part) for name, one in row.run.measures.items()}
+        parts[f"{part}s"] = {name: one for name, one in numbers.items() if one is not None}
+    is_met = row.judgement is Judgement.MEETS
+    worst = {"measure": row.worst.name, "error": row.worst.fraction}
+    return make_details("cost_run", row, worst=worst, meets_tolerance=is_met, **parts)
 
 
 def describe_convergence(runs: list[Cost], setting: str) -> list[JsonObject]:
@@ -290,16 +286,18 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     for name in ("seconds", "wall_seconds", "timings"):
         columns[name] = [getattr(run, name) for run in runs]
     data = make_variables("cost", **columns)
-    columns = {}
+
+    measures = {}
     units = {name: one.unit for run in runs for name, one in run.measures.items()}
     for name, unit in units.items():
         for heading, part in ((name, "value"), (f"error_{name}", "error")):
             numbers = [getattr(run.measures.get(name), part, None) for run in runs]
-            columns[heading] = (numbers, unit)
+            measures[heading] = (numbers, unit)
+
+    data |= make_columns("run", measures)
 
     # an exact run has no place on a logarithmic axis
-    data |= make_columns("run", columns)
-    columns = {
+    judged = {
         "largest_error": [row.worst.fraction or None for row in rows],
         "tolerance": [run.tolerance for run in runs],
         "worst_measure": [row.worst.name.replace("_", " ") for row in rows],
@@ -307,8 +305,8 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     for name in ("nodes", "steps"):
         counts = [getattr(run, name) for run in runs]
         if any(counts):
-            columns[name] = counts
-    data |= make_variables("cost", **columns)
+            judged[name] = counts
+    data |= make_variables("cost", **judged)
     data |= {"main_measure": data[main], "main_measure_error": data[f"error_{main}"]}
 
     # a colour for each varied setting and for runs that miss the tolerance

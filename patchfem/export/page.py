@@ -22,19 +22,8 @@ from .answer import Answers, Quantity
 from .charts import panels, plotly
 from .columns import Table, make_tables
 from .quantities import format_quantity
-from .rows import CHARTS
+from .rows import CHARTS, FILE_DESCRIPTIONS
 
-# what a file beside a page is, by its name or its ending
-FILE_DESCRIPTIONS = {
-    "fields.vtkhdf": "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
-    "interfaces": "fields of every interface that has a patch of its own, in the same format",
-    "summary.json": "verdict, quantities with their errors, warnings and notes, in SI units",
-    "scene.resolved.toml": "the scene in SI units, with all default values",
-    "scene.fitted.toml": "the scene with the fitted values, ready to run",
-    ".nc": "histories, curves and fields along the interface (xarray, MATLAB, ncdump)",
-    ".csv": "columns of a table or of a curve (spreadsheet)",
-    ".json": "all numbers of this answer, in SI units",
-}
 MIN_RATIO_AS_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
 # value in a scene file
 TomlValue = str | float | list[Any] | dict[str, Any]

@@ -145,6 +145,8 @@ CSV_FILES: dict[str, dict[str, CsvFile]] = {
     kind: {name: CsvFile(**row) for name, row in rows.items()}
     for kind, rows in _TABLES["csv_files"].items()
 }
+# what a file beside a page is, by its name or its ending
+FILE_DESCRIPTIONS: dict[str, str] = _TABLES["files"]
 # tables that stand below the charts
 TABLES: dict[str, tuple[Table, ...]] = _repeat_for_runs(
     {kind: tuple(Table(**row) for row in rows) for kind, rows in _TABLES["tables"].items()}

@@ -252,19 +252,20 @@ def _collect_levels(result: Result) -> Variables:
         return {}
     unit = levels[0].unit
     drive_text = "force" if unit == "N" else "acceleration of the base"
-    columns = {"level_drive": ([level.drive for level in levels], unit, drive_text)}
-    data = make_columns("level", columns)
+    drives = [level.drive for level in levels]
+    data = make_columns("level", {"level_drive": (drives, unit, drive_text)})
     data |= make_variables("run", level_stuck=[level.stuck for level in levels])
-    columns = {}
+
+    measures = {}
     table = response.rows.MOTION_TABLE
     for name in response.events.LEVEL_MEASURES:
         if any(name in level.values for level in levels):
             unit = table[name].unit
             values = [level.values.get(name, np.nan) for level in levels]
             errors = [level.errors.get(name, np.nan) for level in levels]
-            columns[f"level_{name}"] = (values, unit, table[name].text)
-            columns[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
-    return data | make_columns("level", columns)
+            measures[f"level_{name}"] = (values, unit, table[name].text)
+            measures[f"level_{name}_error"] = (errors, unit, f"error of level_{name}")
+    return data | make_columns("level", measures)
 
 
 def _collect_regimes(result: Result) -> Variables:

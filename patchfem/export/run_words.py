@@ -104,6 +104,9 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
         text = f"in {cycles:.2g} of a cycle: {text}"
     if onset:
         text = f"{onset}; at the last level: {text}"
+    peak = _describe_peak(result, measures)
+    if peak:
+        text = f"{peak}: {text}"
     return f"{text[0].upper()}{text[1:]}."
 
 
@@ -121,6 +124,16 @@ def _describe_onset(result: Result, measures: Quantities) -> str:
     }
     kind, _ = result.plan.model.rig.drive.levels.onset
     return f"{event_by_kind[kind]} at {_format_measure('onset_level', measures)}"
+
+
+def _describe_peak(result: Result, measures: Quantities) -> str:
+    """Return the clause on the frequencies of the peak and of the folds of a response curve, or "" without a peak."""
+    peak = measures.get("peak_frequency")
+    if peak is None or peak.value is None:
+        return ""
+    folds = [format_quantity(fold, "Hz", 4) for fold in result.motion.steady.curve["folds"]]
+    folded = f" of a curve with folds at {', '.join(folds)}" if folds else " of the response curve"
+    return f"at the peak{folded}, {_format_measure('peak_frequency', measures)}"
 
 
 def _choose_headline(result: Result, measures: Quantities) -> str:

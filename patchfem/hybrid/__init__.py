@@ -30,10 +30,9 @@ A module imports its own entry of this list and the entries before it:
 13. `runs`            runs with errors and histories
 14. `harmonic_balance` balance of the first harmonic of a driven rig
 15. `periodic`        periodic motions by shooting
-16. `continuation`    curves of solutions through folds
-17. `periodic_curves` curves of periodic motions
-18. `quasi_static`    quasi-static motions of a mode
-19. `free_motions`    motions without a drive: backbones and limit cycles
+16. `periodic_curves` periodic motions under further conditions, and their curves through folds
+17. `quasi_static`    quasi-static motions of a mode
+18. `free_motions`    motions without a drive: backbones and limit cycles
 
 Limits. The method is explicit: a law or mode that is 1e4 times faster than the drive takes as many more steps, and a
 run ends with a message after `cases.MAX_STEPS`. Margins are evaluated at three points of a step and at nearly

@@ -27,19 +27,12 @@ from scipy.optimize import brentq
 from ..core import ModalBasis, NotConverged, PatchfemError
 from .cases import MIN_STEPS, Case, Options, UndrivenRig, make_rig, make_start
 from .drives import make_tones
-from .laws import is_rigid, mirror_state
+from .laws import is_rigid
 from .measures import split_integrals
-from .periodic import (
-    MAX_KINKED_CHANGE,
-    MAX_REMAINDER,
-    MAX_STABLE_MULTIPLIER,
-    copy_state,
-)
-from .periodic_curves import N_FIRST, LoopShooting
+from .periodic import MAX_STABLE_MULTIPLIER, copy_state
+from .periodic_curves import N_FIRST, ExtendedShooting
 from .quasi_static import find_static_motions
 from .records import (
-    N_FACE_INTEGRALS,
-    N_INTEGRALS,
     Clock,
     Cycle,
     Memory,
@@ -53,12 +46,6 @@ from .runs import COARSE, COARSE_STEP, ERROR_FLOOR, estimate_error, run_case
 CHANGE_TOL = 1e-10  # change over half a period, relative to the motion, that counts as none
 MAX_STEPS = 1e5  # steps of the engine in the first periods of the search for a motion
 MAX_STEPS_RATIO = 30.0  # steps of the whole search, relative to those of the first periods
-MAX_NEWTON_STEPS = 20  # Newton steps to a motion
-# Largest ratio of the changes over a period after and before a correction at which the derivatives are updated
-MAX_BROYDEN_RATIO = 0.3
-MAX_DETOURS = (
-    3  # largest number of shortened Newton steps, and of Newton steps with new derivatives
-)
 # Largest changes of the two further unknowns in a Newton step: frequency and rate, relative to the frequency
 LONGEST_STEPS = np.array([0.3, 0.6])
 RATE_SCALE = 0.1  # magnitude of the rate 2 zeta omega, relative to the frequency
@@ -172,8 +159,7 @@ class FreeMotion(NamedTuple):
         shooting.map = None
         shooting.state = shooting.advance(self.state)
         linear = shooting.differentiate(self.state)[0]
-        is_motion = ~np.isin(linear.columns, shooting.extra)
-        multipliers = np.linalg.eigvals(linear.slopes[np.ix_(is_motion, is_motion)])
+        multipliers = shooting.find_motion_multipliers(linear)
         shift = np.argmin(np.abs(multipliers - 1))
         return float(np.abs(np.delete(multipliers, shift)).max(initial=0.0)) ** 2
 
@@ -191,12 +177,11 @@ class LinearMotion(NamedTuple):
     zeta: float = 0.0
 
 
-class FreeShooting(LoopShooting):
-    """Map of half a period of a free motion, whose state is extended by two unknowns: frequency and rate.
+class FreeShooting(ExtendedShooting):
+    """Map of half a period of a free motion, whose further unknowns are frequency and rate.
 
     The rate is that of the negative damping, 2 zeta omega, or it multiplies the force. The map adds to the
-    frequency what the output misses of its phase, and to the rate what it misses of its amplitude, so that a motion of
-    the amplitude is a fixed point.
+    frequency what the output misses of its phase, and to the rate what it misses of its amplitude.
 
     Parameters
     ----------
@@ -226,37 +211,32 @@ class FreeShooting(LoopShooting):
         self.unit_force = modes.mass * sizes[1] * float(shape @ shape) / reach**2
         arrays.modes[Mode.PUSH] = modes.output * self.unit_force / modes.mass
 
-        # The further unknowns are states without rates, after those of the laws.
         y = make_start(arrays, rig.interfaces)
-        place = y.size - N_INTEGRALS - N_FACE_INTEGRALS * len(rig.interfaces)
-        self.extra = np.array([place, place + 1])
-        scales = np.insert(arrays.scales, [place, place], [omega, RATE_SCALE * omega])
-        y = np.insert(y, [place, place], [omega, 2 * zeta * omega])
         y[modes.omega.size : 2 * modes.omega.size] = shape * sizes[1] / reach
-        arrays = arrays._replace(scales=scales)
         empty = np.zeros(0)
-        super().__init__(Case(arrays, y, empty, empty, empty, rig.n_friction))
+        super().__init__(
+            Case(arrays, y, empty, empty, empty, rig.n_friction),
+            (omega, 2 * zeta * omega),
+            (omega, RATE_SCALE * omega),
+            [one.law for one in rig.interfaces],
+        )
 
-    def advance(self, state: State) -> State:
-        """Return the state half a period after another one with the opposite sign, its further unknowns corrected."""
-        omega, rate = state.y[self.extra]
-        self._set_excitation(omega, rate)
-        state = copy_state(state)
-        state.y[self.extra[-1] + 1 :] = 0.0
-        end = super().advance(state)
-        rig = self.motions.rig
-        mirror_state(end, rig.modes.omega.size, [one.law for one in rig.interfaces])
-
-        # Half the range of the output, and the cosine part of its fundamental
+    def find_conditions(self, before: State) -> np.ndarray:
+        """Return what frequency and rate miss: the phase of the fundamental of the output, and half of its range."""
+        omega = before.y[self.extra[0]]
         cycle = self.record.cycles[0]
-        self.size = max(cycle[Cycle.MAX], -cycle[Cycle.MIN])
+        size = max(cycle[Cycle.MAX], -cycle[Cycle.MIN])
         cosine = 2 * omega / np.pi * cycle[Cycle.COS]
-        gain = RATE_SCALE * omega * (self.size / self.amplitude - 1)
-        end.y[self.extra] += omega * cosine / self.amplitude, gain
-        return end
+        gain = RATE_SCALE * omega * (size / self.amplitude - 1)
+        return np.array([omega * cosine / self.amplitude, gain])
 
-    def _set_excitation(self, omega: float, rate: float) -> None:
+    def find_excess(self, step, start) -> float:
+        """Return the largest ratio of a Newton step of frequency and rate to LONGEST_STEPS."""
+        return float(np.abs(step[self.extra] / (LONGEST_STEPS * start[self.extra[0]])).max())
+
+    def set_extra(self, values) -> None:
         """Give the map its frequency [rad/s] and its negative damping or force of a rate [1/s]."""
+        omega, rate = values
         self.period = 2 * np.pi / omega
         settings = self.case.rig.settings.copy()
         settings[Setting.LONGEST_STEP] = self.period / self.motions.accuracy.n_steps
@@ -287,15 +267,6 @@ class FreeShooting(LoopShooting):
         state.clock[[Clock.OUTPUT_SIZE, Clock.OUTPUT_SPEED]] = 0.0
         self.state = state
 
-    def find_unknowns(self, before: State) -> np.ndarray:
-        """Return the indices of the unknowns in the packed state.
-
-        The further ones are always among them. The forces at reversal points follow from the displacements beside them.
-        """
-        columns = super().find_unknowns(before)
-        is_force = (columns >= self.n) & ((columns - self.n) % 2 == 1)
-        return np.union1d(columns[~is_force], self.extra)
-
     def solve(self) -> FreeMotion | None:
         """Find the motion, or None without convergence."""
         # A correction that leads far away ends with values that are not finite.
@@ -306,10 +277,7 @@ class FreeShooting(LoopShooting):
                 return None
 
     def _search(self) -> FreeMotion | None:
-        """Find the motion by Newton's method, or None without convergence.
-
-        Where kinks of the laws are close together the change over a period may stop to fall before CHANGE_TOL.
-        """
+        """Find the motion by Newton's method, or None without convergence."""
         # The laws take the states and the memory of the loop.
         laws = slice(2 * self.motions.rig.modes.omega.size, self.extra[0])
         for _ in range(N_FIRST):
@@ -320,48 +288,11 @@ class FreeShooting(LoopShooting):
         # Motions far from that of the mode may take very many steps.
         self.limit_steps(MAX_STEPS_RATIO * self.n_steps)
         guess = self.state
-        step = last_residual = np.zeros(0)
-        best = np.inf
-        n_long = n_maps = 0
-        is_new = False
-        for _ in range(MAX_NEWTON_STEPS):
-            before = self.state
-            self.relax(1)
-            change = self.measure_change(before)
-            if change < CHANGE_TOL or best <= change < MAX_KINKED_CHANGE:
-                is_near = self._find_cosine(guess, before) > MIN_COSINES[self.motions.is_forced]
-                return self._describe(before) if is_near else None
-            if not np.isfinite(change):
-                return None
-
-            # After a correction that helped, its residual updates the derivatives (Broyden's method). A correction with new
-            # derivatives that did not help began too far away.
-            start = self.pack(before)
-            residual = self.pack(self.state) - start
-            if is_new and not change < best:
-                return None
-            is_new = not change < MAX_BROYDEN_RATIO * best
-            if is_new:
-                n_maps += 1
-                self.map = None
-            elif change > MAX_REMAINDER * best:
-                self.map = self.map.update(step, residual - last_residual)
-            best = change
-            last_residual = residual
-            if not np.isfinite(self.differentiate(before)[0].slopes).all():
-                return None
-            self.correct(before)
-            step = self.pack(self.state) - start
-
-            # A long step is shortened, because frequency and damping are then far from those of the motion.
-            excess = np.abs(step[self.extra] / (LONGEST_STEPS * start[self.extra[0]])).max()
-            n_long += excess > 1
-            if max(n_long, n_maps) > MAX_DETOURS or not np.isfinite(step).all():
-                return None
-            if excess > 1:
-                step /= excess
-                self.state = self.unpack(self.state, start + step)
-        return None
+        found = self.find_fixed_point(CHANGE_TOL)
+        if found is None:
+            return None
+        is_near = self._find_cosine(guess, found[0]) > MIN_COSINES[self.motions.is_forced]
+        return self._describe(found[0]) if is_near else None
 
     def _find_cosine(self, first: State, second: State) -> float:
         """Return the cosine of the angle between two states of the modes, whose velocities are divided by the frequency."""

@@ -33,9 +33,9 @@ MASING = LAWS.index("masing")  # number of the law whose memory are reversal poi
 MIN_DIFFERENCE = (
     1e-6  # smallest step of the derivatives of the map, relative to the scale of an unknown
 )
-MAX_ITERATIONS = 30
+MAX_SEARCHES = 10  # searches for a motion, between which it is followed for some periods
 N_FIRST_CYCLES = 8  # cycles before the first correction
-N_RELAXED = 6  # cycles without a correction after the first one that did not help, and twice as many after the next
+N_RELAXED = 6  # cycles without a correction after a search that failed, and twice as many after the next one
 MAX_RELAXED = 200  # largest number of these cycles
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
 # Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
@@ -63,12 +63,14 @@ SEARCH_STEPS_RATIO = (
 # Largest ratio of the changes over a period after and before a correction at which the derivatives of this correction
 # are used again. The ratio is about the relative change of the derivatives.
 MAX_REMAINDER = 1e-3
-# The same for a motion that is followed from a similar one. Further corrections with these derivatives take a period each,
-# new derivatives take one for each unknown.
-MAX_FOLLOWED_REMAINDER = 0.1
-MAX_CORRECTIONS = 8  # corrections of such a motion
-# Memory of the laws that tells which reversal points the derivatives of a period belong to
-FOLLOWED_MEMORY = [Memory.DIRECTION, Memory.CONTACT, Memory.COUNT]
+MAX_NEWTON_STEPS = 20  # Newton steps to a motion from a similar one
+# Largest ratio of the changes over a period after and before such a step at which the derivatives are updated. Further
+# steps with these derivatives take a period each, new derivatives take one for each unknown.
+MAX_BROYDEN_RATIO = 0.3
+MAX_DETOURS = (
+    3  # largest number of shortened Newton steps, and of Newton steps with new derivatives
+)
+NOT_FOLLOWED_MESSAGE = "no periodic motion was found near a similar one"
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
 
@@ -93,7 +95,7 @@ class PeriodicMotion(NamedTuple):
     multipliers: np.ndarray
     n_periods: int
     grows: bool = False
-    map: "_Map | None" = None
+    map: "PeriodMap | None" = None
 
     @property
     def period(self) -> float:
@@ -196,7 +198,10 @@ def _search(
 
     # Near the periodic motion one more correction costs a period, because the derivatives are known.
     if not has_kinks and change < tolerance and error > change:
-        nearer, nearer_change = shooting.correct_once(before)
+        shooting.correct(before)
+        nearer = shooting.state
+        shooting.relax(1)
+        nearer_change = shooting.measure_change(nearer)
         if nearer_change < change and shooting.has_same_regime(nearer):
             before = nearer
             change = nearer_change
@@ -236,28 +241,29 @@ def follow_periodic_motion(
     -------
     PeriodicMotion
         A change of MAX_KINKED_CHANGE over its period counts as none, because an interface that hardly slips comes to rest
-        only after hundreds of periods. It is larger if the similar motion is too far away.
+        only after hundreds of periods.
+
+    Raises
+    ------
+    NotConverged
+        If the similar motion is too far away.
     """
-    shooting = _FollowedShooting(case, odd_laws)
+    shooting = Shooting(case, odd_laws)
     shooting.state = near.run.final
     shooting.map = near.map
     shooting.relax(1)
-    before, change = shooting.approach(MAX_CHANGE * float(case.rig.settings[Setting.RTOL]))
+    found = shooting.find_fixed_point(MAX_CHANGE * float(case.rig.settings[Setting.RTOL]))
+    if found is None:
+        raise NotConverged(NOT_FOLLOWED_MESSAGE)
+    before = found[0]
+    change = shooting.measure_change(before)
 
-    # One more correction, if it brings the start of the measured period nearer to the periodic motion
-    run = None
-    if shooting.serves(before):
+    # One more correction, after which the measured period begins nearer to the periodic motion
+    if shooting.map is not None:
         shooting.correct(before)
-        nearer = shooting.state
-        run = run_case(shooting.whole, start=nearer)
-        shooting.state = run.final
-        nearer_change = shooting.measure_change(nearer)
-        if nearer_change < change and shooting.has_same_regime(nearer):
-            change = nearer_change
-        else:
-            run = None
+        before = shooting.state
     return PeriodicMotion(
-        run or run_case(shooting.whole, start=before),
+        run_case(shooting.whole, start=before),
         change,
         np.inf,
         MAX_KINKED_CHANGE,
@@ -265,30 +271,6 @@ def follow_periodic_motion(
         shooting.n_periods,
         map=shooting.map,
     )
-
-
-def interpolate_motions(
-    first: PeriodicMotion, second: PeriodicMotion, fraction: float
-) -> PeriodicMotion:
-    """Return the start of a motion between two others by linear interpolation; the nearer one if their regimes differ.
-
-    Parameters
-    ----------
-    first, second : PeriodicMotion
-        Motions of similar cases, of which the nearer one has the regimes, the history and the derivatives.
-    fraction : float
-        Place between both, 0 at the first one.
-    """
-    near, far = (first, second) if fraction < 0.5 else (second, first)
-    state = near.run.final
-    other = far.run.final
-    if not np.array_equal(state.memory[:, FOLLOWED_MEMORY], other.memory[:, FOLLOWED_MEMORY]):
-        return near
-    weight = min(fraction, 1 - fraction)
-    memory = state.memory.copy()
-    memory[:, Memory.STACK :] += weight * (other.memory - state.memory)[:, Memory.STACK :]
-    between = state._replace(y=state.y + weight * (other.y - state.y), memory=memory)
-    return near._replace(run=replace(near.run, final=between))
 
 
 class _Growth(NamedTuple):
@@ -350,7 +332,10 @@ class Shooting:
         self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
         self.n_periods = 0
         self.n_steps = 0.0
-        self.map: _Map | None = None
+        self.map: PeriodMap | None = None
+        self.has_exact_map = (
+            False  # whether the derivatives are those near the motion that was found
+        )
         # The errors of a period, of the size of the step tolerance, and of the difference are equal.
         self.difference = max(MIN_DIFFERENCE, float(settings[Setting.RTOL]) ** 0.5)
 
@@ -402,7 +387,15 @@ class Shooting:
     def converge(self, tolerance: float, max_relaxed: int) -> tuple[State, float]:
         """Correct the state until a period changes it by less than a tolerance and keeps the regimes of the laws.
 
-        Up to `max_relaxed` periods without a correction follow one that did not help.
+        Periods of the motion itself follow a search that has failed, twice as many after the next one. They are many for an
+        interface that hardly slips, where the steps of a stuck one lead far away.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest change over a period, relative to the motion.
+        max_relaxed : int
+            Largest number of these periods in a row.
 
         Returns
         -------
@@ -411,39 +404,107 @@ class Shooting:
         change : float
             Change over this period, relative to the scale of the state.
         """
-        best = np.inf
         n_relaxed = N_RELAXED
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(MAX_SEARCHES):
+            state = self.state
+            found = self.find_fixed_point(tolerance, kinked=0.0)
+            if found is not None:
+                if not self.has_exact_map:
+                    self.map = None
+                return found[0], self.measure_change(found[0])
+            self.state = state
+            self.map = None
+            self.relax(n_relaxed)
+            n_relaxed = min(2 * n_relaxed, max_relaxed)
+        before = self.state
+        self.relax(1)
+        return before, self.measure_change(before)
+
+    def find_excess(self, step, start) -> float:
+        """Return the ratio of a Newton step to the longest one; both are packed states, as its `start`."""
+        return 0.0
+
+    def find_fixed_point(
+        self, tolerance: float, kinked: float = MAX_KINKED_CHANGE
+    ) -> tuple[State, int] | None:
+        """Find a motion that meets the conditions by Newton's method, from the present state and derivatives.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest change over a period, relative to the motion.
+        kinked : float
+            The same where it no longer falls, because kinks of the laws are close together.
+
+        Returns
+        -------
+        tuple or None
+            State at the start of the period, and number of periods; None without convergence.
+        """
+        step = last_residual = np.zeros(0)
+        best = np.inf
+        n_long = n_maps = n_regimes = 0
+        is_new = False
+        self.has_exact_map = (
+            False  # whether the derivatives are those near the motion that is found
+        )
+        for count in range(1, MAX_NEWTON_STEPS + 1):
             before = self.state
             self.relax(1)
             change = self.measure_change(before)
-            if change < tolerance:
-                if self.has_same_regime(before):
-                    break
-                self.map = None
-                continue
-
-            # A correction that did not help is given up for some periods of the motion itself. They are many for an
-            # interface that hardly slips, where the steps of a stuck one lead far away.
-            helps = change <= best
-            if helps:
-                # The derivatives of a correction that was nearly exact serve for the next one.
-                if best < np.inf and change > MAX_REMAINDER * best:
-                    self.map = None
-                best = change
-                advanced = self.state
-                self.correct(before)
-                if not self.is_possible():
-                    self.state = advanced
-                    helps = False
-            if not helps:
-                self.relax(n_relaxed)
-                n_relaxed = min(2 * n_relaxed, max_relaxed)
+            if change < tolerance or best <= change < kinked:
+                self.has_exact_map &= change <= MAX_REMAINDER * best
+                # In another regime the reversal points are those that the period has left. A law that sticks may keep the
+                # direction of its last slip, which half a period reverses.
+                if self.odd_laws or self.has_same_regime(before):
+                    return before, count
                 self.map = None
                 best = np.inf
-        if best < np.inf and change > MAX_REMAINDER * best:
-            self.map = None
-        return before, change
+                continue
+            if not np.isfinite(change):
+                return None
+            if self.measures_periods and n_regimes < MAX_DETOURS and not self.odd_laws:
+                # A start in another regime gets the reversal points that the period has left.
+                if not self.has_same_regime(before):
+                    n_regimes += 1
+                    self.state.y[: self.n] = before.y[: self.n]
+                    continue
+
+            # After a correction that helped, its residual updates the derivatives. One with new derivatives that did not
+            # help began too far away.
+            start = self.pack(before)
+            residual = self.pack(self.state) - start
+            if is_new and not change < best:
+                return None
+            is_new = not change < MAX_BROYDEN_RATIO * best
+            if is_new or change > MAX_BROYDEN_RATIO:
+                n_maps += is_new
+                self.map = None
+            elif change > MAX_REMAINDER * best:
+                self.map = self.map.update(step, residual - last_residual)
+            best = change
+            last_residual = residual
+            self.has_exact_map = self.map is None
+            if not np.isfinite(self.differentiate(before)[0].slopes).all():
+                return None
+            advanced = self.state
+            self.correct(before)
+            if not self.is_possible():
+                self.state = advanced
+                self.map = None
+                best = np.inf
+                continue
+            step = self.pack(self.state) - start
+
+            # A long step is shortened, because the motion is then far away.
+            excess = self.find_excess(step, start)
+            n_long += excess > 1
+            if max(n_long, n_maps) > MAX_DETOURS or not np.isfinite(step).all():
+                return None
+            if excess > 1:
+                step /= excess
+                self.state = self.unpack(self.state, start + step)
+        return None
 
     def is_possible(self) -> bool:
         """Return whether no law of reversal points remembers forces beyond its friction limit.
@@ -476,13 +537,6 @@ class Shooting:
             return np.zeros(0), CHECK_FACTOR * distance
         return np.array([(distance / tolerance) ** (1 / N_CHECKED)]), np.inf
 
-    def correct_once(self, before: State) -> tuple[State, float]:
-        """Return the state after a correction of another one, and its change over a period."""
-        self.correct(before)
-        nearer = self.state
-        self.relax(1)
-        return nearer, self.measure_change(nearer)
-
     def scales(self) -> np.ndarray:
         """Return the magnitudes (n,) of the modes and law states at the start of a period."""
         scale = np.maximum(np.abs(self.state.y[: self.n]), self.case.rig.scales[: self.n])
@@ -500,8 +554,11 @@ class Shooting:
         return float((change / self.scales()).max())
 
     def has_same_regime(self, before: State) -> bool:
-        """Return whether the laws are in the regimes of another state."""
-        columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG, Memory.COUNT]
+        """Return whether the laws are in the regimes of another state, whose reversal points may be fewer.
+
+        A loop that round-off makes smaller with each period adds reversal points for ever.
+        """
+        columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG]
         return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
 
     def pack(self, state: State) -> np.ndarray:
@@ -528,7 +585,7 @@ class Shooting:
         is_unknown[self.n :] &= is_used.ravel()
         return np.flatnonzero(is_unknown)
 
-    def differentiate(self, before: State) -> tuple["_Map", np.ndarray]:
+    def differentiate(self, before: State) -> tuple["PeriodMap", np.ndarray]:
         """Return the derivatives of the map of a period from a state, and the change over this period, in scaled unknowns.
 
         The derivatives of the last correction are used again as long as `map` has them.
@@ -550,7 +607,7 @@ class Shooting:
                         break
                 slopes[:, k] = self.find_change(state, end)[columns]
                 slopes[:, k] /= difference * scale
-            self.map = _Map(columns, slopes, scale, before.memory[:, FOLLOWED_MEMORY])
+            self.map = PeriodMap(columns, slopes, scale)
         return self.map, (end - start)[columns] / self.map.scale
 
     def follows_reversals(self, state: State) -> bool:
@@ -596,78 +653,19 @@ class Shooting:
         self.state = self.unpack(self.state, packed)
 
 
-class _FollowedShooting(Shooting):
-    """Map of a period whose derivatives may be those of a similar motion.
-
-    They serve where the laws have as many reversal points as in this motion, also if a period leaves some of the unknowns
-    as they are.
-    """
-
-    def approach(self, tolerance: float) -> tuple[State, float]:
-        """Correct the state until a period changes it by less than a tolerance, or MAX_CORRECTIONS times.
-
-        Returns
-        -------
-        before : State
-            Last state at the start of a period.
-        change : float
-            Change over this period, relative to the scale of the state.
-        """
-        # New derivatives are computed if a period changes the motion by more than MAX_FOLLOWED_REMAINDER of its size, or of
-        # the change before.
-        last = 1.0
-        for _ in range(MAX_CORRECTIONS + 1):
-            before = self.state
-            self.relax(1)
-            change = self.measure_change(before)
-            if change < tolerance and self.has_same_regime(before):
-                break
-            if change > MAX_FOLLOWED_REMAINDER * last:
-                self.map = None
-            last = change
-            advanced = self.state
-            self.correct(before)
-            if not self.is_possible():
-                self.state = advanced
-                self.map = None
-        return before, change
-
-    def serves(self, before: State) -> bool:
-        """Return whether the known derivatives hold at a state: same reversal points, and all states that change."""
-        return (
-            self.map is not None
-            and np.array_equal(self.map.regime, before.memory[:, FOLLOWED_MEMORY])
-            and bool(np.isin(super().find_unknowns(before), self.map.columns).all())
-        )
-
-    def has_same_regime(self, before: State) -> bool:
-        """Return whether the laws are in the regimes of another state, whose reversal points may be fewer.
-
-        A loop that round-off makes smaller with each period adds reversal points for ever.
-        """
-        columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG]
-        return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
-
-    def find_unknowns(self, before: State) -> np.ndarray:
-        """Return the indices of the unknowns in the packed state: those of the derivatives, as long as they serve."""
-        return self.map.columns if self.serves(before) else super().find_unknowns(before)
-
-
-class _Map(NamedTuple):
+class PeriodMap(NamedTuple):
     """Linear map of a period in k scaled unknowns.
 
     - columns: (k,) indices of the unknowns in the packed state and memory
     - slopes: (k, k) derivatives of the end of the period by its start
     - scale: (k,) sizes of the unknowns, by which they are divided
-    - regime: (M, 3) memory of the laws at the start that says which reversal points they have
     """
 
     columns: np.ndarray
     slopes: np.ndarray
     scale: np.ndarray
-    regime: np.ndarray
 
-    def update(self, step, change) -> "_Map":
+    def update(self, step, change) -> "PeriodMap":
         """Return the map that gives a step of the unknowns the change of the residual that was found (Broyden 1965).
 
         Parameters
@@ -680,7 +678,7 @@ class _Map(NamedTuple):
         return self._replace(slopes=self.slopes + np.outer(missing, step) / (step @ step))
 
 
-def _solve_newton(linear: _Map, change, rcond: float) -> np.ndarray:
+def _solve_newton(linear: PeriodMap, change, rcond: float) -> np.ndarray:
     """Return the Newton step (k,) to a state that a period does not change, from the change over a period (k,).
 
     `linear` is the map of the period. Singular values below the fraction `rcond` of the largest one count as 0, because

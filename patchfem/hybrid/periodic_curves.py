@@ -1,27 +1,21 @@
-"""Curves of periodic motions over frequency or level of the drive, through their folds.
+"""Periodic motions that meet further conditions, and their curves over a parameter of the drive, through their folds.
 
-A point of a curve is a fixed point of the map of a period (`periodic`). The unknowns are the modes and the states of the
-laws at phase 0. The reversal points that the laws remember there follow from them over a period, so that they are
-eliminated.
+The state is extended by unknowns without rates, such as a frequency, and the map of a period changes each of them by what a
+condition misses, so that a motion that meets all conditions is a fixed point. The condition of a curve is the value of its
+parameter, or a distance along the curve (pseudo-arc-length continuation: Keller 1977; Seydel, Practical Bifurcation and
+Stability Analysis, 2010, ch. 4). Derivatives are evaluated once at each point; between two points Broyden's method
+updates them (Math. Comp. 19, 577, 1965). The reversal points that the laws remember are unknowns as well.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
-from .cases import Case
-from .continuation import (
-    Curve,
-    CurvePath,
-    Guess,
-    PathEquations,
-    PathPoint,
-    PathSettings,
-    correct_point,
-    find_point,
-    follow_curve,
-)
+from ..core import NotConverged
+from .cases import Case, make_arrays
 from .laws import masing
 from .periodic import (
     MASING,
@@ -29,47 +23,92 @@ from .periodic import (
     MAX_KINKED_CHANGE,
     MAX_STABLE_MULTIPLIER,
     PeriodicMotion,
+    PeriodMap,
     Shooting,
     copy_state,
 )
-from .records import Face, Memory, Probe, Setting, State
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Face, Memory, Probe, Setting, State
 from .runs import run_case
 
 MAX_STEPS = 6e6  # steps of the engine over all periods of a curve, which take about a minute
 N_FIRST = 2  # periods in which the laws take the memory of the loop of a motion from another map
+MIN_ARC_STEP = 1e-7  # smallest step of the arc length
+MAX_CORRECTION = 0.5  # longest Newton step, as arc length
+MIN_STEP_COSINE = 0.7  # smallest cosine between a step and the tangent; a larger angle is a jump
+MIN_TANGENT_COSINE = 0.1  # smallest cosine between two tangents in the cubic through a fold
+SAME_CURVE_TOL = (
+    0.05  # distance from an earlier step, relative to its length, at which a curve has closed
+)
+RANK_TOL = 1e-12  # singular values of a singular matrix are below it, relative to the largest
 
 
-class CurveStart(NamedTuple):
-    """Motion from which a curve is followed.
+class PathSettings(NamedTuple):
+    """Steps of arc-length continuation.
 
-    - state: state at the start of a period
-    - parameter: frequency [rad/s] or level [m s-2] of the drive
+    - first_step, max_step: first and longest step, as arc length [1] of the curve of the scaled parameter and unknowns:
+      the parameter over the width of its bounds, and the unknowns over the size of the motion
+    - max_points: largest number of points
     """
 
-    state: State
-    parameter: float
+    first_step: float = 0.02
+    max_step: float = 0.1
+    max_points: int = 2000
 
 
-class LoopShooting(Shooting):
-    """Map of a period after which the laws remember the loop of this period alone.
+class ExtendedShooting(Shooting):
+    """Map of a period of a state that is extended by unknowns without rates, which stand after the states of the laws.
 
-    Larger motions of the past would otherwise shift the loop for ever, and the map would have a kink at each periodic
-    motion, because its reversals neither exceed those of the period before nor fall short of them. The ends of this loop
-    are measured.
+    A class sets what they mean by `set_extra`, and the conditions that determine them by `find_conditions`. After a period
+    the laws remember the loop of this period alone, whose ends are measured. Larger motions of the past would otherwise
+    shift the loop for ever, and the map would have a kink at each periodic motion, because its reversals neither exceed
+    those of the period before nor fall short of them.
+
+    Parameters
+    ----------
+    case : Case
+        Rig, and the state from which the search begins.
+    values, scales : (e,) sequence
+        Further unknowns at the start, and their magnitudes.
+    odd_laws : sequence of LawNumbers
+        Laws of symmetric motions, see `Shooting`.
     """
 
     measures_periods = True
 
+    def __init__(self, case: Case, values, scales, odd_laws=()):
+        place = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
+        self.extra = place + np.arange(len(values))
+        places = np.full(len(values), place)
+        rig = case.rig._replace(scales=np.insert(case.rig.scales, places, scales))
+        super().__init__(replace(case, rig=rig, y=np.insert(case.y, places, values)), odd_laws)
+
+    def set_extra(self, values) -> None:
+        """Give the rig of the next period the further unknowns (e,)."""
+        raise NotImplementedError
+
+    def find_conditions(self, before: State) -> np.ndarray:
+        """Return what the conditions miss (e,) in the period from a state, as changes of the further unknowns."""
+        raise NotImplementedError
+
     def advance(self, state: State) -> State:
-        """Return the state a period after another one, whose clock starts at 0."""
+        """Return the state a period after another one, its further unknowns corrected by the conditions."""
+        self.set_extra(state.y[self.extra])
+        before = self.load_loops(state)
+        before.y[self.extra[-1] + 1 :] = 0.0
+        end = super().advance(before)
+        end.y[self.extra] += self.find_conditions(before)
+
         faces = self.case.rig.faces
-        n_modes = self.case.rig.modes.shape[1]
-        end = super().advance(self.load_loops(state))
-        slides = self.case.rig.rows[0] @ end.y[:n_modes]
+        slides = self.case.rig.rows[0] @ end.y[: self.case.rig.modes.shape[1]]
         ranges = self.find_ranges()
         for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
             masing.remember_loop(faces[i, Face.NUMBERS :], end.memory[i], ranges[i], slides[i])
         return end
+
+    def has_same_regime(self, before: State) -> bool:
+        """Return whether the laws are in the regimes of another state; a symmetric loop begins at either of its ends."""
+        columns = [Memory.DIRECTION, Memory.CONTACT]
+        return np.array_equal(self.state.memory[:, columns], before.memory[:, columns])
 
     def find_ranges(self) -> np.ndarray:
         """Return the smallest and largest slide (i, 2) of the interfaces in the last period [m]."""
@@ -88,13 +127,16 @@ class LoopShooting(Shooting):
     def find_unknowns(self, before: State) -> np.ndarray:
         """Return the indices of the unknowns in the packed state: what a period changes, and all points of a loop.
 
-        A periodic motion leaves the reversal points of its loop as they were, but they move with it.
+        A periodic motion leaves the reversal points of its loop as they were, but they move with it. Their forces follow
+        from the displacements beside them.
         """
         start = self.pack(before)
         is_unknown = self.pack(self.state) != start
         is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
         is_used = _find_used(before) & _find_used(self.state)
         is_unknown[self.n :] = is_used.ravel() & (start[self.n :] != 0)
+        is_unknown[self.n + 1 :: 2] = False
+        is_unknown[self.extra] = True
         return np.flatnonzero(is_unknown)
 
     def find_change(self, state: State, end) -> np.ndarray:
@@ -116,6 +158,12 @@ class LoopShooting(Shooting):
             masing.load_reversals(faces[i, Face.NUMBERS :], state.memory[i], slides[i])
         return state
 
+    def find_motion_multipliers(self, known: PeriodMap) -> np.ndarray:
+        """Return the eigenvalues of the derivatives of a period with given further unknowns."""
+        is_motion = ~np.isin(known.columns, self.extra)
+        slopes = known.slopes[np.ix_(is_motion, is_motion)]
+        return np.linalg.eigvals(slopes) if np.isfinite(slopes).all() else np.full(1, np.nan)
+
 
 def _align(memory, direction: int) -> np.ndarray:
     """Return memories (M, k) whose last reversal points are in the last columns (direction 1), or as they were (-1)."""
@@ -136,199 +184,271 @@ def _find_used(state: State) -> np.ndarray:
     return np.arange(size) >= size - 2 * count + 2 * (count > 2)
 
 
-class Reversals(NamedTuple):
-    """Reversal points of the laws at phase 0, which follow from the unknowns of a curve.
+class PathPoint(NamedTuple):
+    """Point of a curve.
 
-    - columns: (m,) their places in the memory
-    - gain: (N, m) change of the residual per change of the reversal points over a period
-    - own: (m, m) negative correction of the reversal points per change over a period
-    - by_motion: (m, N + 1) derivatives by unknowns and parameter
-    - w: (N + 1,) unknowns and parameter of the last period
-    - change: (m,) change of the reversal points over it
+    - w: (N + 1,) scaled unknowns, and the parameter
+    - motion: periodic motion with its stability
+    - state: extended state at its start
+    - map: derivatives of the extended map of a period
     """
 
-    columns: np.ndarray
-    gain: np.ndarray
-    own: np.ndarray
-    by_motion: np.ndarray
     w: np.ndarray
-    change: np.ndarray
-
-    def predict(self, w) -> np.ndarray:
-        """Return the change (m,) of the reversal points to unknowns and parameter w (N + 1,)."""
-        return self.by_motion @ (w - self.w) - self.own @ self.change
+    motion: PeriodicMotion
+    state: State
+    map: PeriodMap
 
 
-class PeriodEquations:
-    """Equations of the periodic motions of a rig over a parameter of its drive.
+@dataclass(frozen=True, eq=False, slots=True)
+class CurvePath:
+    """Curve of periodic motions.
+
+    - points: list of PathPoint in order of arc length
+    - folds: parameters at the folds, from a cubic between neighbouring points
+    - ended: "end" at the bound in the first direction; "start" if the curve returned to the other bound; "loop" if it has
+      closed; "points" after the largest number of points; "step" if no step was short enough; "cost" if its motions have
+      taken too many steps
+    """
+
+    points: list[PathPoint]
+    folds: tuple[float, ...]
+    ended: str
+
+
+class MotionCurve(ExtendedShooting):
+    """Periodic motions of a rig over a parameter of its drive, which is an unknown of the map of a period.
 
     Parameters
     ----------
     make_case : callable
         Function of the parameter that returns the `Case` of a period.
-    start : CurveStart
-        Motion near the first point. Its size is the unit of the unknowns.
+    start : State
+        State at the start of a period near the first point. The size of this motion is the unit of the unknowns.
+    parameter : float
+        Frequency [rad/s] or level [m s-2] of the drive there.
     has_kinks : bool
         Whether a law has many elements, see `periodic.find_periodic_motion`.
     """
 
-    def __init__(self, make_case: Callable[[float], Case], start: CurveStart, *, has_kinks: bool):
+    def __init__(
+        self, make_case: Callable[[float], Case], start: State, parameter: float, *, has_kinks: bool
+    ):
         self.make_case = make_case
-        self.start = start
-        self.n_steps = 0.0
-        shooting = self._make_shooting(start.parameter)
-        shooting.state = start.state
-        shooting.relax(N_FIRST)
-        self.n = shooting.n
-        self.scale = shooting.scales()
-        self.before = shooting.state
-        self.reversals: Reversals | None = None
-        self.tolerance = MAX_CHANGE * float(shooting.case.rig.settings[Setting.RTOL])
+        self.plain = make_case(parameter)
+        self.width = abs(parameter) or 1.0
+        super().__init__(self.plain, [parameter], [self.width])
+        self.limit_steps(MAX_STEPS)
+        self.tolerance = MAX_CHANGE * float(self.case.rig.settings[Setting.RTOL])
         if has_kinks:
             self.tolerance = max(self.tolerance, MAX_KINKED_CHANGE)
 
-    @property
-    def curve(self) -> Curve:
-        """Equations for the continuation."""
-        return Curve(self.find_residual, self.differentiate, self.restart)
+        # The laws take the memory of the loop from periods with the given parameter, which no condition changes.
+        self.state.y[: self.n - 1] = start.y[: self.n - 1]
+        self.state.memory[:] = start.memory
+        self.aimed = self.normal = np.zeros(self.pack(self.state).size)
+        self.relax(N_FIRST)
+        self.size = np.append(self.scales()[:-1], 1.0)
 
-    def _make_shooting(self, parameter: float) -> LoopShooting:
-        """Return the map of a period at a value of the parameter."""
-        shooting = LoopShooting(self.make_case(float(parameter)))
-        shooting.limit_steps(MAX_STEPS)
-        shooting.n_steps = self.n_steps
-        return shooting
+    def set_extra(self, values) -> None:
+        """Give the rig of the next period its parameter (1,)."""
+        self.plain = self.make_case(float(values[0]))
+        old = self.case.rig
+        settings = self.plain.rig.settings.copy()
+        settings[Setting.MAX_STEPS] = old.settings[Setting.MAX_STEPS]
+        self.period = float(settings[Setting.PERIOD])
+        rig = self.plain.rig._replace(settings=settings, scales=old.scales)
+        self.case = replace(self.case, rig=rig, ends=np.array([self.period]))
 
-    def _advance(self, x, parameter: float) -> tuple[LoopShooting, State]:
-        """Return the map with the state after a period, and the state before it, with the memory that belongs to it.
+    def find_conditions(self, before: State) -> np.ndarray:
+        """Return the negative distance (1,) of a state from the plane of its search, as a change of the parameter."""
+        return np.array([-self.width * float(self.normal @ (self.pack(before) - self.aimed))])
 
-        `x` (N,) are the unknowns, divided by their scale, and `parameter` is that of the drive.
-        """
-        shooting = self._make_shooting(parameter)
-        w = np.append(x, parameter)
-        packed = shooting.pack(self.before)
-        packed[: self.n] = x * self.scale
-        if self.reversals is not None:
-            packed[self.reversals.columns] += self.reversals.predict(w)
-        before = shooting.unpack(self.before, packed)
-        shooting.state = shooting.advance(before)
-        self.n_steps = shooting.n_steps
+    def find_excess(self, step, start) -> float:
+        """Return the arc length of a Newton step, relative to MAX_CORRECTION."""
+        return float(np.linalg.norm(step[: self.n] / self.size / self.unit)) / MAX_CORRECTION
 
-        # In another regime the reversal points are those that the period has left.
-        regime = [Memory.DIRECTION, Memory.CONTACT]
-        is_same = np.array_equal(shooting.state.memory[:, regime], before.memory[:, regime])
-        if self.reversals is not None and is_same:
-            change = shooting.pack(shooting.state) - packed
-            change[self.n :][~_find_used(shooting.state).ravel()] = 0.0
-            change = change[self.reversals.columns]
-            self.reversals = self.reversals._replace(w=w, change=change)
-            self.before = before
-        else:
-            self.reversals = None
-            self.before = copy_state(shooting.state)
-        return shooting, before
+    def scales(self) -> np.ndarray:
+        """Return the magnitudes (n,) of modes, law states and parameter."""
+        scale = super().scales()
+        scale[self.extra] = self.width
+        return scale
 
-    def find_residual(self, x, parameter: float) -> np.ndarray:
-        """Return the change (N,) of the unknowns over a period, in units of their scale; arguments as `_advance`."""
-        shooting, before = self._advance(x, parameter)
-        residual = (shooting.state.y - before.y)[: self.n] / self.scale
-        if self.reversals is not None:
-            residual += self.reversals.gain @ self.reversals.change
-        return residual
+    def read_w(self, state: State) -> np.ndarray:
+        """Return the scaled unknowns and the parameter (N + 1,) of a state."""
+        return state.y[: self.n] / self.size
 
-    def differentiate(self, x, parameter: float) -> PathEquations:
-        """Return the derivatives of the change over a period, and the `PeriodicMotion` as their details.
+    def make_normal(self, direction, unit) -> np.ndarray:
+        """Return a direction (N + 1,) in units (N + 1,) of w as the normal (K,) of a plane of packed states."""
+        normal = np.zeros(self.aimed.size)
+        normal[: self.n] = direction / unit / self.size
+        return normal
 
-        They are NaN far from any motion, where that of the next period is not finite.
-        """
-        shooting, before = self._advance(x, parameter)
-        linear, change = shooting.differentiate(before)
-        columns = linear.columns
-        is_motion = columns < self.n
-
-        # Derivatives by the parameter, all in units of the curve.
-        step = shooting.difference * parameter
-        end = shooting.pack(shooting.state)
-        other = self._make_shooting(parameter + step).find_change(before, end)
-        by_parameter = other[columns] / linear.scale / step
-        unit = linear.scale.copy()
-        unit[is_motion] /= self.scale[columns[is_motion]]
-        slopes = unit[:, None] * (linear.slopes - np.eye(columns.size)) / unit
-        matrix = np.column_stack([slopes, unit * by_parameter])
-
-        # The reversal points m follow from the unknowns: (M - 1) dm + ... = -change.
-        is_kept = np.append(is_motion, True)
-        own = matrix[~is_motion][:, ~is_kept]
-        own = np.linalg.pinv(own) if np.isfinite(own).all() else np.nan * own.T
-        gain = -matrix[is_motion][:, ~is_kept] @ own
-        reduced = matrix[is_motion][:, is_kept] + gain @ matrix[~is_motion][:, is_kept]
-
-        # A state that a period does not change keeps its value.
-        places = columns[is_motion]
-        jacobian = -np.eye(self.n)
-        jacobian[np.ix_(places, places)] = reduced[:, :-1]
-        slope = np.zeros(self.n)
-        slope[places] = reduced[:, -1]
-
-        by_motion = np.zeros((own.shape[0], self.n + 1))
-        by_motion[:, np.append(places, self.n)] = -own @ matrix[~is_motion][:, is_kept]
-        whole_gain = np.zeros((self.n, own.shape[0]))
-        whole_gain[places] = gain
-        left = (end - shooting.pack(before))[columns[~is_motion]]
-        self.before = before
-        self.reversals = Reversals(
-            columns[~is_motion], whole_gain, own, by_motion, np.append(x, parameter), left
-        )
-        motion = self._describe(shooting, before, change)
-        self.n_steps = shooting.n_steps
-        memory = (self.before, self.reversals)
-        return PathEquations(jacobian, slope, motion, motion.change, memory)
-
-    def _describe(self, shooting: LoopShooting, before: State, change) -> PeriodicMotion:
-        """Return the motion over the period from a point of the curve, with its Floquet multipliers.
+    def find_tangent(self, point: PathPoint, direction, unit) -> np.ndarray:
+        """Return the change of the packed state along a curve per arc length.
 
         Parameters
         ----------
-        shooting : Shooting
-            Map of a period with its derivatives and the state after a period.
-        before : State
-            State at the start of the period.
-        change : (k,) array
-            Change over the period in the unknowns of the map.
+        point : PathPoint
+            Point of the curve.
+        direction : (N + 1,) array
+            Scaled direction to which the tangent points.
+        unit : (N + 1,) array
+            Sizes by which differences of w are divided.
         """
-        multipliers, error = shooting.find_multipliers(before)
+        known = point.map
+        matrix = np.eye(known.columns.size) - known.slopes
+        place = int(np.searchsorted(known.columns, self.extra[0]))
+        matrix[place] = self.make_normal(direction, unit)[known.columns] * known.scale
+        right_side = np.eye(known.columns.size)[place]
+        scaled = np.linalg.lstsq(matrix, right_side, rcond=RANK_TOL)[0]
+        tangent = np.zeros(self.aimed.size)
+        tangent[known.columns] = known.scale * scaled
+        return tangent / np.linalg.norm(tangent[: self.n] / self.size / unit)
+
+    def differentiate(self, before: State) -> tuple[PeriodMap, np.ndarray]:
+        """Return the derivatives of the map of a period, those of its condition exactly, and the change over the period."""
+        known, change = super().differentiate(before)
+        place = int(np.searchsorted(known.columns, self.extra[0]))
+        slopes = known.slopes.copy()
+        slopes[place] = -self.normal[known.columns] * known.scale * self.width / known.scale[place]
+        slopes[place, place] += 1.0
+        self.map = known._replace(slopes=slopes)
+        return self.map, change
+
+    def describe(self, before: State) -> PathPoint:
+        """Return the point of the curve whose motion begins at a state, with its Floquet multipliers."""
+        self.state = self.advance(before)
+        self.map = None
+        known, change = self.differentiate(before)
+        multipliers = self.find_motion_multipliers(known)
         if np.abs(multipliers).max(initial=0.0) >= MAX_STABLE_MULTIPLIER:
             # Differences in the other direction do not pass the same kink of a law.
-            shooting.difference *= -1
-            shooting.map = None
-            other = shooting.find_multipliers(before)[0]
+            self.difference *= -1
+            self.map = None
+            other = self.find_motion_multipliers(self.differentiate(before)[0])
+            self.difference *= -1
             multipliers = min(multipliers, other, key=lambda found: np.abs(found).max())
-        return PeriodicMotion(
-            run_case(shooting.case, start=shooting.load_loops(before)),
+        self.map = known
+        error = self.find_multipliers(before)[1]
+
+        # The measures are those of a period without the further unknown.
+        self.set_extra(before.y[self.extra])
+        start = make_arrays(self.plain)[0]
+        loops = self.load_loops(before)
+        start.y[: self.n - 1] = before.y[: self.n - 1]
+        start.memory[:] = loops.memory
+        motion = PeriodicMotion(
+            run_case(self.plain, start=start),
             float(np.abs(change).max(initial=0.0)),
             error,
             self.tolerance,
             multipliers[np.argsort(-np.abs(multipliers))],
-            shooting.n_periods,
+            self.n_periods,
         )
+        return PathPoint(self.read_w(before), motion, before, known)
+
+    def _find_point(self, guess, near: PathPoint, direction, unit) -> tuple[PathPoint, int] | None:
+        """Return the point of a curve in a plane, and the number of periods of its search; None without convergence.
+
+        Parameters
+        ----------
+        guess : (K,) array
+            Packed state in the plane, from which the search begins.
+        near : PathPoint
+            Point whose regimes and derivatives are used first.
+        direction, unit : (N + 1,) array
+            Normal of the plane in units of w: the tangent of the curve, or the parameter, which then keeps its value.
+        """
+        self.state = self.unpack(near.state, guess)
+        self.aimed = guess
+        self.normal = self.make_normal(direction, unit)
+        self.unit = unit
+        self.map = near.map
+        with np.errstate(invalid="ignore", over="ignore"):
+            found = self.find_fixed_point(self.tolerance)
+        return None if found is None else (self.describe(found[0]), found[1])
+
+    def _find_crossing(self, w, near: PathPoint) -> PathPoint | None:
+        """Return the point with the parameter of a guess w (N + 1,), from another point; None if it is not found."""
+        guess = self.pack(near.state)
+        guess[: self.n] = w * self.size
+        unit = np.full(w.size, float(np.linalg.norm(w[:-1])) or 1.0)
+        unit[-1] = self.width
+        found = self._find_point(guess, near, np.eye(w.size)[-1], unit)
+        return None if found is None else found[0]
 
     def follow(
         self, bounds: tuple[float, float], settings: PathSettings, *, forward: bool = True
     ) -> CurvePath:
-        """Follow the curve from its start. The details of a point are its `PeriodicMotion`.
+        """Follow the curve from its start.
 
         Parameters
         ----------
         bounds : tuple
-            Lowest and highest value of the parameter.
+            Lowest and highest value of the parameter; the last point lies on one of them.
         settings : PathSettings
-            Steps along the curve; its tolerance is replaced by that of the map.
+            Steps along the curve.
         forward : bool
             Whether the parameter increases at first.
+
+        Raises
+        ------
+        NotConverged
+            If the first point is not found.
         """
-        settings = settings._replace(tolerance=self.tolerance)
-        x = self.before.y[: self.n] / self.scale
-        return follow_curve(self.curve, x, self.start.parameter, bounds, settings, forward=forward)
+        low, high = bounds
+        w = self.read_w(self.state)
+        first = self._find_crossing(w, PathPoint(w, None, self.state, None))
+        if first is None:
+            raise NotConverged(
+                "accuracy.method: the first point of the curve was not found near the given start"
+            )
+        points = [first]
+        unit = np.full(w.size, float(np.linalg.norm(w[:-1])) or 1.0)
+        unit[-1] = high - low
+        direction = np.append(np.zeros(w.size - 1), 1.0 if forward else -1.0)
+        folds: list[float] = []
+        step = settings.first_step
+        ended = "points"
+
+        # A step without a solution is halved. The points found so far are a curve also if the next one costs too much.
+        try:
+            while len(points) < settings.max_points:
+                # The unit of the unknowns rises with their norm, so that steps have the same relative length.
+                point = points[-1]
+                unit[:-1] = max(unit[0], 0.5 * float(np.linalg.norm(point.w[:-1])))
+                tangent = self.find_tangent(point, direction, unit)
+                direction = tangent[: self.n] / self.size / unit
+                guess = self.pack(point.state) + step * tangent
+                taken = self._find_point(guess, point, direction, unit)
+                if taken is None or not _is_along(point, taken[0], direction, unit):
+                    step /= 2
+                    if step < MIN_ARC_STEP:
+                        ended = "step"
+                        break
+                    continue
+
+                # The last point lies on the bound that the step passes.
+                after, n_periods = taken
+                if not low <= after.w[-1] <= high:
+                    bound = high if after.w[-1] > high else low
+                    last = self._find_crossing(_interpolate(point, after, bound), point)
+                    points += [last] * (last is not None)
+                    ended = "end" if (bound == high) == forward else "start"
+                    break
+
+                is_closed = _is_on_curve(after, points, direction, unit)
+                points.append(after)
+                tangent = self.find_tangent(after, direction, unit)
+                tangents = (direction, tangent[: self.n] / self.size / unit)
+                folds += _find_folds(points[-2:], tangents, unit, step)
+                if is_closed:
+                    ended = "loop"
+                    break
+                step = min(step * _step_factor(n_periods), settings.max_step)
+        except NotConverged:
+            ended = "cost"
+        return CurvePath(points, tuple(folds), ended)
 
     def find_between(
         self, first: PathPoint, second: PathPoint, fraction: float, width: float
@@ -346,35 +466,86 @@ class PeriodEquations:
         width : float
             Change of the parameter that counts as 1.
         """
+        self.n_steps = 0.0
         unit = find_unit(first, second, width)
         step = (second.w - first.w) / unit
-        tangent = step / np.linalg.norm(step)
-        guess = Guess(first.w + fraction * (second.w - first.w), tangent, unit)
-        self.n_steps = 0.0
-        self.restart(first)
-        found = correct_point(self.curve, first, guess, self.tolerance)
+        guess = self.pack(first.state)
+        guess[: self.n] = (first.w + fraction * (second.w - first.w)) * self.size
+        found = self._find_point(guess, first, step / np.linalg.norm(step), unit)
         return None if found is None else found[0]
-
-    def restart(self, point: PathPoint) -> None:
-        """Begin the next correction at a point of the curve."""
-        self.before = point.equations.memory[0]
-        self.reversals = point.equations.memory[1]
 
     def list_crossings(self, path: CurvePath, parameter: float) -> list[PathPoint]:
         """Return the points at which a path passes a value of the parameter, in their order."""
         found = []
         for first, second in zip(path.points[:-1], path.points[1:]):
-            before = first.w[-1]
-            after = second.w[-1]
-            if (before > parameter) == (after > parameter):
-                continue
-            guess = first.w + (parameter - before) / (after - before) * (second.w - first.w)
-            guess[-1] = parameter
-            self.n_steps = 0.0
-            self.restart(first)
-            point = find_point(self.curve, first, guess, self.tolerance)
-            found += [point] * (point is not None)
+            if (first.w[-1] > parameter) != (second.w[-1] > parameter):
+                self.n_steps = 0.0
+                point = self._find_crossing(_interpolate(first, second, parameter), first)
+                found += [point] * (point is not None)
         return found
+
+
+def _interpolate(first: PathPoint, second: PathPoint, parameter: float) -> np.ndarray:
+    """Return the point w (N + 1,) of the line through two points that has a parameter."""
+    fraction = (parameter - first.w[-1]) / (second.w[-1] - first.w[-1])
+    return np.append((first.w + fraction * (second.w - first.w))[:-1], parameter)
+
+
+def _step_factor(n_periods: int) -> float:
+    """Return the ratio of the next step to the last one, above 1 if the search took few periods."""
+    if n_periods <= 5:
+        return 1.5
+    return 1.1 if n_periods <= 7 else 0.6
+
+
+def _is_along(point: PathPoint, after: PathPoint, direction, unit) -> bool:
+    """Return whether a step between two points follows a direction (N + 1,) in units (N + 1,) of w; else it is a jump."""
+    taken = (after.w - point.w) / unit
+    return float(taken @ direction) > MIN_STEP_COSINE * float(np.linalg.norm(taken))
+
+
+def _is_on_curve(point: PathPoint, points: list[PathPoint], direction, unit) -> bool:
+    """Return whether a point lies on an earlier step of the curve, so that the curve has closed and would be followed again.
+
+    `points` are those of the curve in their order, `direction` (N + 1,) is that of the last step, and the distances are
+    scaled by `unit` (N + 1,).
+    """
+    places = np.array([other.w for other in points]) / unit
+    starts = places[:-2]
+    steps = np.diff(places[:-1], axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    to_point = point.w / unit - starts
+    along = np.sum(to_point * steps, axis=1) / lengths
+    across = np.linalg.norm(to_point - (along / lengths)[:, None] * steps, axis=1)
+    is_between = (along >= 0) & (along <= lengths) & (across < SAME_CURVE_TOL * lengths)
+    is_parallel = steps @ direction > MIN_STEP_COSINE * lengths
+    return bool((is_between & is_parallel).any())
+
+
+def _find_folds(points: list[PathPoint], tangents, unit, length: float) -> list[float]:
+    """Return the parameter at a fold between two points that follow each other, [] without a fold.
+
+    The parameter is a cubic of the distance along the tangent at the first point, and a fold is its extreme.
+
+    Parameters
+    ----------
+    points : list of PathPoint
+        Both points.
+    tangents : (2, N + 1) array
+        Unit tangents there in units of w.
+    unit : (N + 1,) array
+        Sizes by which differences of w are divided.
+    length : float
+        Scaled arc length between the points.
+    """
+    slopes = np.array([tangents[0][-1], tangents[1][-1]])
+    if slopes[0] * slopes[1] >= 0:
+        return []
+    slopes[1] /= max(float(tangents[0] @ tangents[1]), MIN_TANGENT_COSINE)
+    parameters = [point.w[-1] for point in points]
+    curve = CubicHermiteSpline([0.0, length], parameters, slopes * unit[-1])
+    places = curve.derivative().roots(extrapolate=False)
+    return [float(curve(place)) for place in places[:1]]
 
 
 def find_unit(first: PathPoint, second: PathPoint, width: float) -> np.ndarray:

@@ -153,7 +153,7 @@ def build_interface_laws(scene: Scene) -> tuple[InterfaceLaw, ...]:
     tuple of InterfaceLaw
         Empty without friction.
     """
-    tables = scene.structure.interface
+    tables = () if scene.structure is None else scene.structure.interface
     if tables:
         return tuple(_build_interface(scene, number) for number in range(len(tables)))
     if scene.friction is None:

@@ -21,7 +21,7 @@ from ..scene.overrides import replace_number
 from ..scene.rules.methods import MotionFeatures, find_motion_features
 from ..scene.scene import Scene
 from . import load, patch, rig, slide, structure, wear
-from .law import find_pad_width, make_bond_parameters, make_effective_law
+from .law import build_interface_laws, find_pad_width, make_bond_parameters
 from .source import SceneWriter, Source, locate_errors
 
 if TYPE_CHECKING:
@@ -385,18 +385,14 @@ def _build_law(scene: Scene, rig_model: Rig | None) -> _SceneLaw:
 
     It is empty without friction.
     """
-    interfaces = scene.structure.interface if scene.structure is not None else ()
-    law = interfaces[0] if interfaces else scene.friction
-    if law is None:
+    laws = build_interface_laws(scene) if rig_model is None else rig_model.friction.interfaces
+    if not laws:
         return _SceneLaw()
-    pad = find_pad_width(scene)
-    if interfaces and interfaces[0].contact is not None:
-        pad = interfaces[0].contact.width
-    if rig_model is not None:
-        friction = rig_model.friction.interfaces[0].numbers
-    else:
-        friction = make_effective_law(law, pad)
-    return _SceneLaw(friction, law.spread, pad)
+    tables = () if scene.structure is None else scene.structure.interface
+    if tables:
+        contact = tables[0].contact
+        return _SceneLaw(laws[0].numbers, tables[0].spread, contact and contact.width)
+    return _SceneLaw(laws[0].numbers, scene.friction.spread, find_pad_width(scene))
 
 
 def _build_measured(scene: Scene) -> MeasuredFile | None:

@@ -1,6 +1,6 @@
 """Run a study from the command line: `--help`, `--out FOLDER`, further options, and the time that has passed.
 
-A study writes its files into `out/studies/<name>`, so that a run leaves the checkout as it was. `--out` with the folder
+A study writes its files into `out/studies/<folder>`, so that a run leaves the checkout as it was. `--out` with the folder
 of the study renews the pictures and tables that the pages show, and the CPU seconds in `report/seconds.json`.
 """
 
@@ -46,7 +46,7 @@ def run_study(main: Callable, **options: Option) -> None:
     )
     target = inspect.signature(main).parameters.get("path")
     if target is not None:
-        place = Path("out/studies") / file.stem
+        place = Path("out/studies") / file.parent.name
         parser.add_argument("--out", type=Path, default=place, help=f"folder for files [{place}]")
     for option, (default, text) in options.items():
         kind = {"action": "store_true"} if default is False else {"type": type(default)}

@@ -7,7 +7,7 @@ once with an effect so small that the motion must be that without it.
 from functools import cache
 
 import pytest
-from scene_runs import run_scene
+from scene_runs import load_scene, run_scene
 from scene_texts import THREE_CYCLES
 
 LAWS = {
@@ -239,3 +239,11 @@ def test_law_with_effect(effect, law):
     for name in ("loop_area", "friction_force_peak", "relative_displacement_amplitude"):
         if plain.get(name) is not None:
             assert vanished[name] == pytest.approx(plain[name], rel=tolerance), name
+
+
+@pytest.mark.parametrize("law", ["elastic-plastic", "iwan", "tanh"])
+def test_number_of_shear_modes_is_used_where_a_patch_has_no_elements(law):
+    """A law without parallel elements behind elastic pieces takes accuracy.shear_modes; another one gets a remark."""
+    scene = load_scene(make_scenes("shear", law)[0], "accuracy.shear_modes=7")
+    assert (scene.accuracy.shear_modes == 7) == (law != "elastic-plastic")
+    assert bool(scene.remarks) == (law == "elastic-plastic")

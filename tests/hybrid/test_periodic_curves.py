@@ -9,10 +9,9 @@ from scipy.integrate import solve_ivp
 
 from patchfem.core import G_N, NotConverged, SineDrive
 from patchfem.hybrid import cases, drives, periodic_curves, runs
-from patchfem.hybrid.continuation import Curve, PathEquations, PathSettings, follow_curve
 from patchfem.hybrid.laws import masing
 from patchfem.hybrid.periodic import Shooting, find_periodic_motion
-from patchfem.hybrid.periodic_curves import CurveStart, PeriodEquations
+from patchfem.hybrid.periodic_curves import MotionCurve, PathSettings
 from patchfem.hybrid.records import LawNumbers
 
 AMPLITUDE = "relative_displacement_amplitude"
@@ -47,8 +46,8 @@ def trace_frequencies(modes, laws, level, ends):
         return make_case(modes, laws, SineDrive(level, omega))
 
     first = find_periodic_motion(make(ends[0]))
-    equations = PeriodEquations(
-        make, CurveStart(first.run.final, ends[0]), has_kinks=masing.has_many_elements(laws[0])
+    equations = MotionCurve(
+        make, first.run.final, ends[0], has_kinks=masing.has_many_elements(laws[0])
     )
     return equations, equations.follow(ends, STEPS)
 
@@ -60,54 +59,21 @@ def list_coexisting_motions(modes, laws, drive):
         return make_case(modes, laws, SineDrive(level, drive.omega))
 
     weak = 1e-2 * drive.acceleration
-    start = CurveStart(find_periodic_motion(make(weak)).run.final, weak)
-    equations = PeriodEquations(make, start, has_kinks=False)
+    start = (find_periodic_motion(make(weak)).run.final, weak)
+    equations = MotionCurve(make, *start, has_kinks=False)
     path = equations.follow((0.0, 10 * drive.acceleration), PathSettings(0.005, 0.02))
-    motions = [
-        point.equations.details for point in equations.list_crossings(path, drive.acceleration)
-    ]
+    motions = [point.motion for point in equations.list_crossings(path, drive.acceleration)]
     return sorted(motions, key=lambda motion: motion.run.values[AMPLITUDE])
 
 
 # ---- continuation
 
 
-def test_exact_continuation_follows_circle_through_fold():
-    """Continuation follows the circle x^2 + p^2 = 1 through its fold at p = 1 to the other side,
-    within 1e-8."""
-    circle = Curve(
-        lambda x, p: np.array([x[0] ** 2 + p**2 - 1]),
-        lambda x, p: PathEquations(np.array([[2 * x[0]]]), np.array([2 * p])),
-    )
-    path = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), PathSettings(0.05, 0.05))
-    x, p = np.array([point.w for point in path.points]).T
-    assert path.ended == "start" and p[-1] == -0.5
-    assert x[-1] == pytest.approx(-np.sqrt(0.75), abs=1e-9)
-    assert x**2 + p**2 == pytest.approx(np.ones(p.size), abs=1e-8)
-    assert path.folds == (pytest.approx(1.0, abs=1e-8),)
-    back = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), PathSettings(0.05, 0.05), forward=False)
-    x, p = np.array([point.w for point in back.points]).T
-    assert back.ended == "end" and (np.diff(p) < 0).all() and (x > 0).all()
-
-
-def test_continuation_ends_where_curve_closes():
-    """A circle within the bounds ends after one turn of 2 pi, with a fold at each side."""
-    circle = Curve(
-        lambda x, p: np.array([x[0] ** 2 + p**2 - 1]),
-        lambda x, p: PathEquations(np.array([[2 * x[0]]]), np.array([2 * p])),
-    )
-    path = follow_curve(circle, [0.6], 0.8, (-2.0, 2.0), PathSettings(0.01, 0.02))
-    assert path.ended == "loop" and path.folds == pytest.approx((1.0, -1.0), abs=1e-6)
-    x, p = np.array([point.w for point in path.points]).T
-    turned = np.unwrap(np.arctan2(x, p))
-    assert abs(turned[-1] - turned[0]) == pytest.approx(2 * np.pi, abs=0.1)
-
-
 def test_continuation_ends_with_count_of_steps():
     """A curve whose motions take too many steps ends before its bound, and a search for one motion is refused."""
     ends = (2 * np.pi * 100, 2 * np.pi * 130)
-    first = CurveStart(find_periodic_motion(make_sine_case(ends[0])).run.final, ends[0])
-    equations = PeriodEquations(make_sine_case, first, has_kinks=False)
+    first = (find_periodic_motion(make_sine_case(ends[0])).run.final, ends[0])
+    equations = MotionCurve(make_sine_case, *first, has_kinks=False)
     equations.n_steps = periodic_curves.MAX_STEPS - 5e3
     path = equations.follow(ends, STEPS)
     assert path.ended == "cost" and 1 < len(path.points) and path.points[-1].w[-1] < ends[1]
@@ -118,32 +84,9 @@ def test_continuation_ends_with_count_of_steps():
         shooting.relax(10)
 
 
-def test_continuation_keeps_its_points_if_the_bound_costs_too_much():
-    """A curve whose point on the bound takes too many steps ends before the bound with the points found so far."""
-
-    def find_residual(x, p):
-        if p == 1.0:
-            raise NotConverged("too many steps")
-        return x - p
-
-    line = Curve(find_residual, lambda x, p: PathEquations(np.eye(1), np.array([-1.0])))
-    path = follow_curve(line, [0.0], 0.0, (0.0, 1.0))
-    assert path.ended == "cost" and 0.9 < path.points[-1].w[-1] < 1.0
-
-
 def make_sine_case(omega: float) -> cases.Case:
     """Return the case of a period of the rig with a cubic spring at a frequency [rad/s]."""
     return make_case(RIG, DUFFING, SineDrive(LEVEL, omega))
-
-
-def test_refuses_start_without_nearby_curve():
-    """A start from which no point of the curve is found is refused."""
-    curve = Curve(
-        lambda x, p: x**2 + 1 + p**2,
-        lambda x, p: PathEquations(np.diag(2 * x), np.array([2 * p])),
-    )
-    with pytest.raises(NotConverged, match="the first point of the curve"):
-        follow_curve(curve, [0.3], 0.5, (0.0, 1.0))
 
 
 # ---- folds and stability of the rig with a cubic spring
@@ -171,7 +114,7 @@ def test_exact_folds_are_near_those_of_one_harmonic():
     folds = sorted(path.folds)
     assert folds == pytest.approx(sorted(expected), rel=2e-2)
 
-    largest = np.array([np.abs(point.equations.details.multipliers).max() for point in path.points])
+    largest = np.array([np.abs(point.motion.multipliers).max() for point in path.points])
     omega = np.array([point.w[-1] for point in path.points])
     changes = np.flatnonzero(np.diff(largest > 1))
     assert sorted(omega[changes]) == pytest.approx(folds, rel=2e-3)
@@ -232,8 +175,8 @@ def test_curve_passes_where_the_reversal_is_at_the_start_of_the_period():
         return make_case(RIG, laws, SineDrive(level, 2 * np.pi * 147.2))
 
     level = 5.14 * G_N
-    start = CurveStart(find_periodic_motion(make(level)).run.final, level)
-    equations = PeriodEquations(make, start, has_kinks=False)
+    start = (find_periodic_motion(make(level)).run.final, level)
+    equations = MotionCurve(make, *start, has_kinks=False)
     path = equations.follow((5.13 * G_N, 5.2 * G_N), PathSettings(0.003, 0.03))
     speeds = np.array([point.w[1] for point in path.points])
     assert path.ended == "end" and speeds[0] < 0 < speeds[-1]
@@ -248,9 +191,9 @@ def test_exact_points_of_curve_agree_with_long_runs(law):
     modes = make_modes(zeta=0.02)
     _, path = trace_frequencies(modes, [law], 0.5, (0.6, 3.0))
     assert path.ended == "end" and not path.folds
-    assert all(point.equations.details.is_stable for point in path.points)
+    assert all(point.motion.is_stable for point in path.points)
     for point in path.points[:: len(path.points) // 5]:
-        values = point.equations.details.run.values
+        values = point.motion.run.values
         run = runs.run_case(make_case(modes, [law], SineDrive(0.5, point.w[-1]), 300)).values
         for name in (AMPLITUDE, "loop_area"):
             assert values[name] == pytest.approx(run[name], rel=2e-3), (point.w[-1], name)

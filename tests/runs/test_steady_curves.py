@@ -200,7 +200,7 @@ def test_exact_curve_of_iwan_law_with_five_modes_agrees_with_march():
     assert all(point.stable for point in points)
     peak = max(points, key=lambda point: point.values[AMPLITUDE])
     for point in (points[0], peak, points[-1]):
-        state = point.guess.equations.details.run.final
+        state = point.guess.motion.run.final
         assert np.abs(state.y[:5]).max() <= 2 * point.values[AMPLITUDE]
         sine = SINE.format(point.drive.omega / (2 * np.pi), 800).replace('"5 g"', '"14 g"')
         found = pf.run(IWAN_MODES + sine, **{"accuracy.method": "march"}).measures[AMPLITUDE]

@@ -77,6 +77,9 @@ def test_exact_comparison_at_5_g_is_reproduced():
     at_5_g = run_shipped_rig().measures[amplitude].value / MIL
     ratio = f"{at_5_g:.3f} mil, {at_5_g / 0.23:.2f} times the measured 0.23 mil"
     assert ratio in readme and f"displacement is {ratio}" in bullet
+    row = r"shipped rig, 143 Hz, 4 g: displacement \| 0.08 mil \| ([\d.]+) mil"
+    (at_4_g,) = re.findall(row, read_page("studies/report/reproduced.md"))
+    assert f"{float(at_4_g):.3f} mil (measured: 0.08 mil)" in readme
     second = pf.run(ROOT / "studies/table_1/second_path.toml").measures[amplitude].value / MIL
     assert (
         f"displacement at 5 g is {second:.3f} mil, {second / 0.23:.2f} times the measured one"

@@ -24,7 +24,7 @@ def test_always_studies_are_run_with_options():
 
 
 def test_always_study_writes_only_below_out(tmp_path):
-    """A study prints its help, and writes its picture into the folder of --out, by default out/studies/<name>."""
+    """A study prints its help, and writes its picture into the folder of --out, by default out/studies/<folder>."""
     study = ROOT / "report/figure_13.py"
     folder = tmp_path / "here"
 
@@ -38,5 +38,5 @@ def test_always_study_writes_only_below_out(tmp_path):
     assert f"files: {folder}" in run_study("--out", str(folder)).stderr
     run_study()
     made = [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.svg")]
-    assert sorted(made) == ["here/figure_13.svg", "out/studies/figure_13/figure_13.svg"]
+    assert sorted(made) == ["here/figure_13.svg", "out/studies/report/figure_13.svg"]
     assert study.with_suffix(".svg").read_bytes() == before

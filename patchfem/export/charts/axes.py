@@ -37,6 +37,7 @@ MATPLOTLIB_STYLE = {
     "legend.frameon": False,
     "legend.fontsize": 9,
     "figure.constrained_layout.use": True,
+    "lines.linewidth": 1.4,
 }
 # metadata that leave out the date
 METADATA_WITHOUT_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}

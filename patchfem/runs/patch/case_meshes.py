@@ -3,7 +3,7 @@
 In: a `PatchModel` whose loading and gap shapes may contain arrays, and a tolerance. Out: a `Batch`. The cases are pressed
 together on nested meshes. Those that miss the tolerance go on with the next mesh. When this would be too expensive, they
 are divided by the ends of their contacts, and each part gets meshes that are graded to its own contacts. A case
-that is alone has the meshes of a single run, which ends with its tolerance or with the limit of the mesh.
+that is alone ends with its tolerance or with the limit of the mesh of a single run.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError
 from ...mesh.grading import Layout
 from ..refine import NO_LIMIT, Verdict, refine
 from . import grids, mesh_levels
@@ -22,7 +21,6 @@ from .measures import (
     MeshValues,
     collect_mesh_values,
     estimate_static_measures,
-    max_mesh_error_ratio,
 )
 from .press import Level, PressedCases, make_level, press_on_level
 from .values import contact_reaches_steep_end, find_contact_edges
@@ -149,10 +147,7 @@ def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
     Batch
     """
     solver = _CaseSolver(patch_model, make_cases(patch_model, count), tolerance)
-    if count == 1:
-        for number in range(count):
-            solver.solve_alone(number)
-    elif patch_model.mesh.is_automatic:
+    if patch_model.mesh.is_automatic:
         solver.solve()
     else:
         solver.solve_on_given_meshes()
@@ -183,12 +178,7 @@ class _CaseSolver:
         """Solve the cases on meshes that they share, and those that miss the tolerance on meshes of smaller groups."""
         numbers = np.arange(self.cases.n_cases)
         search = _ContactSearch(self.patch_model, self.cases, numbers)
-        layout, contact = grids.search_layout(self.patch_model, search.find_contacts)
-        # Nothing is loaded, or no case can be pressed; the single runs tell why
-        if contact is None:
-            for number in numbers.tolist():
-                self.solve_alone(number)
-            return
+        layout, _ = grids.search_layout(self.patch_model, search.find_contacts)
         groups = [(OpenCases(numbers, search.guess_places(), []), layout)]
         while groups:
             cases, layout = groups.pop()
@@ -209,25 +199,6 @@ class _CaseSolver:
             layout = grids.make_common_layout([self.contacts[number] for number in graded])
             groups.append((OpenCases(numbers[rows], None, []), layout))
         return groups
-
-    def solve_alone(self, number: int) -> None:
-        """Solve one case like a single run."""
-        try:
-            fine, *_ = mesh_levels.solve_with_coarser(
-                take_patch(self.patch_model, number), self.tolerance
-            )
-        except PatchfemError as error:
-            self.batch.fail(number, error)
-            return
-        measures = fine.measures.values()
-        columns = [[one.value for one in measures], [one.error for one in measures]]
-        columns += [[one.floor for one in measures]]
-        values, errors, floors = np.array(columns, float)[:, :, None]
-        excess = np.array([max_mesh_error_ratio(fine.measures, self.tolerance)])
-        found = CaseMeasures(
-            tuple(fine.measures), values, errors, floors, excess, collect_facts(fine.pressed)
-        )
-        self.batch.put(np.array([number]), found)
 
     def solve_on_given_meshes(self) -> None:
         """Solve all cases on the meshes that the scene prescribes."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...core import Measure, PatchfemError, compute_allowed_error
+from ...core import PatchfemError, compute_allowed_error
 from ...formatting import format_length
 from ...mesh.grid import TensorGrid
 from ..results.patch_rows import (
@@ -451,37 +451,6 @@ def compute_fraction_error(estimates: StaticEstimates, peak: int, fraction: int)
     relative = estimates.errors[peak] / pressure
     error = values[fraction] * relative / (1 - np.minimum(relative, 0.5))
     return np.maximum(estimates.errors[fraction], error)
-
-
-def extrapolate_static_measures(values_by_mesh, hidden_errors, tolerance) -> Measures:
-    """Return the measures of a single case from its values on two meshes or more (`extrapolate_static_values`).
-
-    Parameters
-    ----------
-    values_by_mesh : list of dict
-        Numbers by name, coarse to fine.
-    hidden_errors : dict
-        Errors by name that no refinement shows.
-    tolerance : float or None
-        Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
-
-    Returns
-    -------
-    dict
-        Measure by name.
-    """
-    return extrapolate_static_values(values_by_mesh, hidden_errors, tolerance).make_measures(0)
-
-
-def widen_fraction_error(peak: Measure, fraction: Measure) -> Measure:
-    """Return the loaded fraction with an error that is at least that due to the peak pressure.
-
-    The loaded fraction is the mean pressure divided by the peak pressure, so that both have the same
-    relative error.
-    """
-    relative = peak.error / peak.value if peak.value > 0 else 0.0
-    error = fraction.value * relative / (1 - min(relative, 0.5))
-    return replace(fraction, error=max(fraction.error, error))
 
 
 def max_mesh_error_ratio(measures_by_name: Measures, tolerance: float) -> float:

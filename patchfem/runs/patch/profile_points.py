@@ -24,9 +24,9 @@ from .measures import (
     MIN_CONTACT_EDGE_ERROR_IN_CELLS,
     PRESSURE_PEAK_MEASURES,
     Resolution,
+    compute_fraction_error,
     estimate_hidden_errors,
-    extrapolate_static_measures,
-    widen_fraction_error,
+    extrapolate_static_values,
 )
 from .press import PointSolution, Surface
 from .values import EdgeValues, assemble_static_values, estimate_peak_pressure
@@ -150,25 +150,28 @@ def _combine_refinement_series(
     finest = point_levels[-1]
     # Errors that a refinement does not show, such as that of a contact of few points.
     hidden_errors = estimate_hidden_errors(finest.resolution, finest.values)
-    by_points = extrapolate_static_measures(
+    by_points = extrapolate_static_values(
         [level.values for level in point_levels], hidden_errors, 0.0
     )
-    by_ends = extrapolate_static_measures([level.values for level in end_levels], {}, 0.0)
-    out = {}
-    for name, estimate in by_points.items():
-        if name not in PRESSURE_PEAK_MEASURES or not finest.has_corner_peak:
-            value = estimate.value + by_ends[name].value - end_levels[-1].values[name]
-            error = estimate.error + by_ends[name].error
-            out[name] = make_measure(name, value, error, HALF_SPACE_SOURCE)
+    by_ends = extrapolate_static_values([level.values for level in end_levels], {}, 0.0)
+    values = by_points.values + by_ends.values
+    values -= np.array([[end_levels[-1].values[name]] for name in by_points.names])
+    errors = by_points.errors + by_ends.errors
 
     # The loaded fraction is the mean pressure divided by the peak.
-    peak_name, fraction_name = PRESSURE_PEAK_MEASURES
-    peak = out.get(peak_name)
-    if peak is not None and peak.value > 0:
-        fraction = finest.values[fraction_name] * finest.values[peak_name] / peak.value
-        measure = make_measure(fraction_name, fraction, 0.0, HALF_SPACE_SOURCE)
-        out[fraction_name] = widen_fraction_error(peak, measure)
-    return out
+    combined = by_points._replace(values=values, errors=errors)
+    peak, fraction = map(combined.names.index, PRESSURE_PEAK_MEASURES)
+    if values[peak, 0] > 0:
+        pressure, part = (finest.values[name] for name in PRESSURE_PEAK_MEASURES)
+        values[fraction] = part * pressure / values[peak]
+        errors[fraction] = 0.0
+        errors[fraction] = compute_fraction_error(combined, peak, fraction)
+    omitted = PRESSURE_PEAK_MEASURES if finest.has_corner_peak else ()
+    return {
+        name: make_measure(name, float(value), float(error), HALF_SPACE_SOURCE)
+        for name, (value,), (error,) in zip(combined.names, values, errors)
+        if name not in omitted
+    }
 
 
 def _solve_level(patch_model, side_level: int, count: int, start=None) -> PointLevel:

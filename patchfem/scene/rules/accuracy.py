@@ -11,6 +11,7 @@ from .methods import (
     find_climbed_grooves,
     find_load_change_key,
     find_motion_features,
+    has_shear_elements,
 )
 from .scene_draft import SceneDraft
 from .view import UNKNOWN_VALUE
@@ -192,6 +193,8 @@ def _find_reason_without_effect(setting: str, accuracy: Accuracy, motion: Motion
     # Elements in closed form need no shear modes.
     if not motion.compliance:
         return "for pieces that are rigid in shear"
-    if motion.load_change or motion.grooves or any(law_has_trait(law.law, "bonds") for law in laws):
+    changes = motion.load_change or motion.grooves or motion.bands_yaw or motion.lower_shape
+    soft = [joint for joint in motion.joints if joint.compliance]
+    if changes or not all(map(has_shear_elements, soft)):
         return ""
     return f"for law '{laws[0].law}' under a constant load (this case is solved exactly without the key)"

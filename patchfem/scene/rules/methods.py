@@ -159,13 +159,13 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
         elif support.law == "pieces" and is_rigid:
             is_supported &= not law_has_trait(joint.law.law, "set-valued")
         elif support.law == "pieces":
-            is_supported = _has_elements(joint)
+            is_supported = has_shear_elements(joint)
         if not is_supported:
             return joint
     return None
 
 
-def _has_elements(joint: Joint) -> bool:
+def has_shear_elements(joint: Joint) -> bool:
     """Return whether an interface that slips part by part is a set of parallel elements."""
     return law_supports(joint.law, "pieces") and law_supports(joint.law, "shear")
 
@@ -182,7 +182,7 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     if motion.grooves:
         return law_has_trait(law, "memoryless") and not (joint.compliance or joint.is_uneven)
     if joint.compliance:
-        return _has_elements(joint)
+        return has_shear_elements(joint)
     if motion.load_change:
         # Regimes of the elastic-plastic law have springs that come and go with the load.
         is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)

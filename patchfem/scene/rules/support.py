@@ -11,7 +11,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable
 from functools import cache, cached_property, reduce
-from itertools import repeat
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,7 +29,6 @@ from .methods import (
     find_climbed_grooves,
     find_heave_key,
     find_yaw_key,
-    list_lower_shapes,
 )
 from .scene_draft import SceneDraft
 from .structure import find_instrument_key
@@ -102,23 +100,22 @@ class Joint(TableFacts):
         return law_has_trait(self.law or None, trait)
 
     @cached_property
+    def _sides(self) -> dict[str, str]:
+        """Piece on which each shape of the patch lies, by the key that says so."""
+        shapes = self.contact.table.shapes if self.contact else {}
+        return {f"{self.patch_key}.{name}.on": one.on for name, one in shapes.items() if one.on}
+
+    @property
     def lower_shape(self) -> str:
         """Key of the first shape on the lower piece; "" if there is none, or if shapes lie on both pieces."""
-        shapes = self.contact.table.shapes if self.contact else {}
-        lower = list_lower_shapes(self.contact.table, self.patch_key) if self.contact else []
-        return lower[0] if lower and len(lower) == len(shapes) else ""
+        return next(iter(self._sides)) if set(self._sides.values()) == {"lower"} else ""
 
-    @cached_property
+    @property
     def opposite_shape(self) -> str:
         """Key of a shape on another piece than the shapes before it, the last one that is written; "" for none."""
-        shapes = self.contact.table.shapes if self.contact else {}
-        sides = {}
-        for name, shape in shapes.items():
-            if shape.on:
-                sides[f"{self.patch_key}.{name}.on"] = shape.on
-        if len(set(sides.values())) < 2:
+        if len(set(self._sides.values())) < 2:
             return ""
-        return next(filter(self.draft.has, reversed(sides)), next(iter(sides)))
+        return next(filter(self.draft.has, reversed(self._sides)), next(iter(self._sides)))
 
     @property
     def has_unbounded_bonds(self) -> bool:
@@ -174,15 +171,20 @@ class Joint(TableFacts):
 class Feature(NamedTuple):
     """Property of a joint that cannot be combined with every other.
 
-    - is_there: function that returns whether a Joint has the property.
+    - is_there: property of a Joint that tells whether it has the feature, or a function of it.
     - key: dotted key that causes it; "" for a mere condition. `{name}` in it, and in `words`, stands for a property of
       the joint.
     - words: text for messages; "" for the key itself.
     """
 
-    is_there: Callable[[Joint], Any]
+    is_there: Callable[[Joint], Any] | str
     key: str = ""
     words: str = ""
+
+    def is_in(self, joint: Joint) -> bool:
+        """Return whether a joint has the feature."""
+        name = self.is_there
+        return bool(getattr(joint, name) if isinstance(name, str) else name(joint))
 
 
 JOINT_FEATURES = {
@@ -193,22 +195,18 @@ JOINT_FEATURES = {
         "drive.waveform",
         "a motion that is not steady",
     ),
-    "sensor apart from the output": Feature(lambda j: j.instrument_key, "{instrument_key}"),
-    "output that bounds the motion": Feature(lambda j: j.bounding_key, "{bounding_key}"),
+    "sensor apart from the output": Feature("instrument_key", "{instrument_key}"),
+    "output that bounds the motion": Feature("bounding_key", "{bounding_key}"),
     "joint without a single stiffness": Feature(
-        lambda j: j.variable_stiffness_key, "{variable_stiffness_key}"
+        "variable_stiffness_key", "{variable_stiffness_key}"
     ),
     # the load
-    "mode with heave or pitch": Feature(lambda j: j.heave_key, "{heave_key}"),
+    "mode with heave or pitch": Feature("heave_key", "{heave_key}"),
     "mode that turns or lifts a joint without places": Feature(
-        lambda j: j.unplaced_motion, "{unplaced_motion}", "a joint without places"
+        "unplaced_motion", "{unplaced_motion}", "a joint without places"
     ),
-    "pressure in motion or of an interface": Feature(
-        lambda j: j.other_pressure, "{other_pressure}"
-    ),
-    "changing load or grooves": Feature(
-        lambda j: j.load_change_or_grooves, "", "{load_change_or_grooves}"
-    ),
+    "pressure in motion or of an interface": Feature("other_pressure", "{other_pressure}"),
+    "changing load or grooves": Feature("load_change_or_grooves", "", "{load_change_or_grooves}"),
     "changing load": Feature(
         lambda j: j.kind == "rig" and j.load_change, "{load_change}", "{load_change_description}"
     ),
@@ -219,7 +217,7 @@ JOINT_FEATURES = {
         "{kinetic:g} below static = {static:g}",
     ),
     "bonds that no force can move": Feature(
-        lambda j: j.has_unbounded_bonds,
+        "has_unbounded_bonds",
         "{table_key}.initial_bonds",
         "{initial_bonds:g} with order = {order:g} (reading 'report'), whose bonds at rest no force can move,",
     ),
@@ -229,16 +227,16 @@ JOINT_FEATURES = {
         "{patch_key}.asperities.law",
         "'{contact.asperities.law}'",
     ),
-    "partial slip": Feature(lambda j: j.compliance, "{compliance}"),
+    "partial slip": Feature("compliance", "{compliance}"),
     "shape on the lower piece": Feature(
-        lambda j: j.lower_shape, "{lower_shape}", "a shape on the lower piece"
+        "lower_shape", "{lower_shape}", "a shape on the lower piece"
     ),
     "shapes on different pieces": Feature(
-        lambda j: j.opposite_shape, "{opposite_shape}", "a shape on each piece"
+        "opposite_shape", "{opposite_shape}", "a shape on each piece"
     ),
     "grooves": Feature(lambda j: not j.is_interface and j.grooves, "contact.grooves", "{grooves}"),
     # interfaces
-    "interface": Feature(lambda j: j.is_interface, "{table_key}", "[[structure.interface]]"),
+    "interface": Feature("is_interface", "{table_key}", "[[structure.interface]]"),
 }
 
 
@@ -254,16 +252,10 @@ def find_feature(name: str) -> Feature:
     return Feature(lambda j: j.find_key_value(key), shown_key)
 
 
-def _read_rows() -> tuple[tuple[str, str], ...]:
-    """Return the features of each row of support.toml, and what to do instead."""
-    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    rows = []
-    for instead, features in tomllib.loads(text).items():
-        rows += zip(features, repeat(instead))
-    return tuple(rows)
-
-
-UNSUPPORTED_COMBINATIONS = _read_rows()
+# Features of a row, separated by ", ", and what to do instead
+UNSUPPORTED_COMBINATIONS = tuple(
+    tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")).items()
+)
 
 
 def check_combinations(draft: SceneDraft, kind: str) -> None:
@@ -278,7 +270,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
         joints.append(Joint(draft, f"structure.interface.{index}", table, table.contact, kind))
     for joint in joints:
         # Many rows name the same feature, which is looked for only once.
-        is_there = cache(lambda name, joint=joint: find_feature(name).is_there(joint))
+        is_there = cache(lambda name, joint=joint: find_feature(name).is_in(joint))
         reported: set[str] = set()  # one mistake for each key is enough
         for names, instead in UNSUPPORTED_COMBINATIONS:
             first, *others = names.split(", ")

@@ -255,7 +255,6 @@ MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a pea
 # Tolerance of the position of a peak, relative to its width: a part of the tolerance of the scene, at least round-off.
 POSITION_TOL = 0.1
 MIN_POSITION_TOL = 3e-4
-LARGEST_GAP = 1.5  # distance to the farther neighbour of a peak at which its refinement ends, relative to this tolerance
 WIDTH_HEIGHT_FRACTION = 0.9  # Fraction of the height of a peak at which its width is measured.
 # Ratio of the shift of a peak to its width times the relative error of its height. The width is
 # measured a tenth below the peak, so that an error of a tenth shifts it by its width.
@@ -342,59 +341,31 @@ class CurveInProgress:
             measure_peak_width(heights[k:], positions[k:] - place),
             measure_peak_width(heights[k::-1], place - positions[k::-1]),
         ) or np.ptp(positions)
-        try:
-            brackets = [np.inf, np.inf]
-            for _ in range(MAX_ADDED_POINTS):
-                k = self.positions.index(place)
-                around = self.positions[max(k - 1, 0) : k + 2]
-                farther = max(around, key=lambda other: abs(other - place))
-                if abs(farther - place) <= LARGEST_GAP * tolerance * width:
-                    return
+        distance = tolerance * width
+        brackets = [np.inf, np.inf]
+        for _ in range(MAX_ADDED_POINTS):
+            # The highest point and its neighbours, of which the one that is farther away is approached
+            first = max(k - 1, 0)
+            x = np.array(self.positions[first : k + 2])
+            y = self.find_heights()[first : k + 2]
+            top = self.positions[k]
+            farther = float(x[np.abs(x - top).argmax()])
+            if abs(farther - top) <= 1.5 * distance:
+                return
 
-                # Two steps that have not halved the bracket are followed by a bisection.
-                brackets.append(around[-1] - around[0])
-                added = (place + farther) / 2
-                if brackets[-1] <= 0.5 * brackets[-3]:
-                    added = self._choose_place(place, farther, tolerance * width)
-                self._add_point(added)
-                place = self._find_top(added)
-        except NotConverged:
-            # The points that have been added remain.
-            return
-
-    def _find_top(self, place: float) -> float:
-        """Return the position of the highest of three neighbouring points, the middle of which is at `place`."""
-        k = self.positions.index(place)
-        around = range(max(k - 1, 0), min(k + 2, len(self.positions)))
-        heights = self.find_heights()
-        return self.positions[max(around, key=lambda number: heights[number])]
-
-    def _choose_place(self, place: float, farther: float, distance: float) -> float:
-        """Return the position of the vertex of a parabola through the inverse squares of three heights.
-
-        This parabola is exact for a linear resonance. Its vertex is moved to a distance from the highest point, towards the
-        farther neighbour, if it is nearer to a point.
-
-        Parameters
-        ----------
-        place, farther : float
-            Positions of the highest point, and of the neighbour that is farther away.
-        distance : float
-            Smallest distance from a point.
-        """
-        k = self.positions.index(place)
-        x = np.array(self.positions[max(k - 1, 0) : k + 2])
-        y = self.find_heights()[max(k - 1, 0) : k + 2]
-        if x.size < 3 or not (y > 0).all():
-            return (place + farther) / 2
-
-        # Divided differences (Newton); the middle inverse square is the lowest of three, so that a vertex lies between them
-        inverse = (y[1] / y) ** 2
-        slopes = np.diff(inverse) / np.diff(x)
-        vertex = 0.5 * (x[0] + x[1] - slopes[0] * (x[2] - x[0]) / (slopes[1] - slopes[0]))
-        if np.abs(x - vertex).min() > distance:
-            return float(vertex)
-        return place + float(np.copysign(min(distance, abs(farther - place) / 2), farther - place))
+            # Two steps that have not halved the bracket are followed by a bisection.
+            brackets.append(np.ptp(x))
+            added = (top + farther) / 2
+            if x.size == 3 and (y > 0).all() and brackets[-1] <= 0.5 * brackets[-3]:
+                vertex = _find_vertex(x, y)
+                side = np.copysign(min(distance, abs(farther - top) / 2), farther - top)
+                added = vertex if np.abs(x - vertex).min() > distance else top + side
+            try:
+                self._add_point(float(added))
+            except NotConverged:
+                # The points that have been added remain.
+                return
+            k = first + int(self.find_heights()[first : first + x.size + 1].argmax())
 
     def _add_point(self, position: float) -> None:
         """Compute the point at a position along the curve and add it."""
@@ -404,6 +375,18 @@ class CurveInProgress:
         point = self.finder.compute_point_between(self.points[k - 1], self.points[k], fraction)
         self.points.insert(k, point)
         self.positions.insert(k, position)
+
+
+def _find_vertex(x, y) -> float:
+    """Return the vertex of the parabola through the inverse squares of three values y, of which the middle one is largest.
+
+    This parabola is exact for a linear resonance, so that its vertex is near the maximum of the curve over x.
+    """
+    inverse = (y[1] / y) ** 2
+    slopes = np.diff(inverse) / np.diff(x)
+    if slopes[0] == slopes[1]:
+        return float(x[1])
+    return float(0.5 * (x[0] + x[1] - slopes[0] * (x[2] - x[0]) / (slopes[1] - slopes[0])))
 
 
 def measure_peak_width(y, distances) -> float:

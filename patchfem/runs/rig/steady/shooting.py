@@ -14,11 +14,14 @@ import numpy as np
 from .... import compiled
 from ....core import NotConverged, Outcome, PatchfemError, SineDrive
 from ....formatting import format_length
-from ....hybrid import cases, periodic
-from ....hybrid.continuation import PathPoint, PathSettings
-from ....hybrid.harmonic_balance import BalancedMotions, balance_first_harmonic
+from ....hybrid import cases, harmonic_balance, periodic
 from ....hybrid.laws import is_rigid, masing
-from ....hybrid.periodic_curves import CurveStart, PeriodEquations, measure_distance
+from ....hybrid.periodic_curves import (
+    MotionCurve,
+    PathPoint,
+    PathSettings,
+    measure_distance,
+)
 from ....hybrid.records import Probe, State, Status, Window
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
@@ -53,13 +56,10 @@ STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, rela
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 1  # cycles before the first correction of a motion that starts from a similar one
-# Height of a maximum of the first-harmonic balance that is examined, relative to the largest steady motion. On 300 random
-# dampers the balance exceeded it by up to a factor of 1.8, and fell short of it by 10 %.
-MIN_HEIGHT_RATIO = 0.5
 MAX_BRACKET_STEPS = (
     8  # steps, each twice as long as the one before, beyond which no maximum is looked for
 )
-N_BALANCED_CYCLES = (
+harmonic_balance.N_FIRST_CYCLES = (
     3  # cycles before the first correction of a motion that starts from the first-harmonic balance
 )
 # Relative distance from its friction limit at which an interface slips as a whole
@@ -129,7 +129,7 @@ class ShootingFinder:
         is_undamped = self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL
         if isinstance(guess, State):
             motion = periodic.find_periodic_motion(
-                case, start=guess, n_first=N_BALANCED_CYCLES, odd_laws=self.odd_laws
+                case, start=guess, n_first=harmonic_balance.N_FIRST_CYCLES, odd_laws=self.odd_laws
             )
         elif guess is None or needs_stability or is_undamped:
             motion = periodic.find_periodic_motion(
@@ -213,9 +213,7 @@ class ShootingFinder:
 
     def compute_point_values(self, point: CurvePoint) -> Values:
         """Return the measures of the motion of a curve point; {} without a steady motion there."""
-        motion = (
-            point.guess.equations.details if isinstance(point.guess, PathPoint) else point.guess
-        )
+        motion = point.guess.motion if isinstance(point.guess, PathPoint) else point.guess
         try:
             if motion is None:
                 return self.compute_steady_motion(point.drive).values
@@ -239,7 +237,7 @@ class ShootingFinder:
         """
         # A point of a response curve has its periodic motion already; else it is found from the guess.
         if isinstance(guess, PathPoint):
-            motion = guess.equations.details
+            motion = guess.motion
         else:
             try:
                 motion = self.find_periodic_motion(drive, guess)
@@ -290,14 +288,15 @@ class ShootingFinder:
         """
         level = drive.acceleration
         weak = replace(drive, acceleration=WEAK_DRIVE * level)
-        start = CurveStart(self.find_periodic_motion(weak).run.final, weak.acceleration)
-        equations = PeriodEquations(
+        start = self.find_periodic_motion(weak).run.final
+        equations = MotionCurve(
             lambda level: self.make_case(replace(drive, acceleration=level)),
             start,
+            weak.acceleration,
             has_kinks=self.joints.has_kinks,
         )
         path = equations.follow((0.0, MAX_LEVEL_RATIO * level), LEVEL_PATH)
-        motions = [point.equations.details for point in equations.list_crossings(path, level)]
+        motions = [point.motion for point in equations.list_crossings(path, level)]
         return sorted(motions, key=lambda motion: motion.run.values[AMPLITUDE])
 
     def _estimate_errors(self, values: Values, motion, run, drive, *, is_stuck: bool) -> Values:
@@ -472,7 +471,10 @@ class ShootingFinder:
         if self.follows_curve:
             return self._follow_curve(drive)
         if not self.draws_curve:
-            points = self._bracket_peaks(drive)
+            try:
+                points = self._bracket_peaks(drive)
+            except NotConverged:
+                points = []
             if points:
                 return ResponseCurve(points)
 
@@ -502,72 +504,43 @@ class ShootingFinder:
         laws = self.odd_laws
         if not laws or self.joints.has_kinks or self._max_growth_rate >= 0:
             return []
-        frequencies = np.sort(choose_start_frequencies(self.modes, drive))
-        omega = 2 * np.pi * frequencies
-        balanced = balance_first_harmonic(self.modes, laws, drive.acceleration, omega)
+        omega = 2 * np.pi * np.sort(choose_start_frequencies(self.modes, drive))
+        balanced = harmonic_balance.balance_first_harmonic(
+            self.modes, laws, drive.acceleration, omega
+        )
         gauge = self.modes.output if self.modes.gauge is None else self.modes.gauge
         heights = np.abs(balanced.modes @ gauge)
 
         # The highest maxima come first, and end where none is high enough beside the motions that were found.
         padded = np.pad(heights, 1)
         maxima = np.flatnonzero((heights >= padded[:-2]) & (heights >= padded[2:]))
-        points: dict[float, CurvePoint] = {}
-        highest = 0.0
+        points: list[CurvePoint] = []
         for k in maxima[np.argsort(-heights[maxima])]:
-            if heights[k] < MIN_HEIGHT_RATIO * highest:
+            highest = max((point.values[AMPLITUDE] for point in points), default=0.0)
+            if heights[k] < harmonic_balance.MIN_HEIGHT_RATIO * highest:
                 break
-            try:
-                found = self._bracket_peak(drive, balanced, heights, k)
-            except NotConverged:
-                return []
-            if not found:
-                return []
-            points |= found
-            highest = max(point.values[AMPLITUDE] for point in points.values())
-        return [points[frequency] for frequency in sorted(points, reverse=drive.low > drive.high)]
+            sine = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
+            start = balanced.make_start(self.make_case(sine), k)
+            top = self.compute_curve_point(sine, start, needs_stability=False)
+            points.append(top)
 
-    def _bracket_peak(
-        self, drive, balanced: BalancedMotions, heights, k: int
-    ) -> dict[float, CurvePoint]:
-        """Return points of a curve by their frequencies [rad/s], around its maximum near an estimated one.
-
-        Parameters
-        ----------
-        drive : SweepDrive
-            Its amplitude and its range of frequencies.
-        balanced : BalancedMotions
-            First harmonics of the motions at rising frequencies.
-        heights : (k,) array
-            Their amplitudes [m].
-        k : int
-            Number of the first harmonic at the estimated maximum.
-        """
-        omega = balanced.omega
-        first = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
-        start = balanced.make_start(self.make_case(first), k)
-        points = {omega[k]: self.compute_curve_point(first, start, needs_stability=False)}
-
-        # Outwards from the estimate until the amplitude falls on both sides
-        widths = (
-            measure_peak_width(heights[k::-1], omega[k] - omega[k::-1]),
-            measure_peak_width(heights[k:], omega[k:] - omega[k]),
-        )
-        for width, end, direction in zip(widths, (omega[0], omega[-1]), (-1, 1)):
-            last = omega[k]
-            for step in width * 2.0 ** np.arange(MAX_BRACKET_STEPS):
-                if last == end:
-                    break
-                place = float(np.clip(last + direction * step, omega[0], omega[-1]))
-                sine = replace(first, omega=place)
-                points[place] = self.compute_curve_point(
-                    sine, points[last].guess, needs_stability=False
+            # Outwards from the estimate, in steps of twice the length, until the amplitude falls on both sides
+            for direction, end in ((-1, omega[0]), (1, omega[-1])):
+                last = top
+                step = direction * measure_peak_width(
+                    heights[k::direction], np.abs(omega[k::direction] - omega[k])
                 )
-                if points[place].values[AMPLITUDE] < points[last].values[AMPLITUDE]:
-                    break
-                last = place
-            else:
-                return {}
-        return points
+                while last.drive.omega != end:
+                    place = float(np.clip(last.drive.omega + step, omega[0], omega[-1]))
+                    point = self.compute_curve_point(
+                        replace(sine, omega=place), last.guess, needs_stability=False
+                    )
+                    points.append(point)
+                    if point.values[AMPLITUDE] < last.values[AMPLITUDE]:
+                        break
+                    last = point
+                    step *= 2
+        return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
 
     def _follow_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation along its arc length, through its folds."""
@@ -577,9 +550,10 @@ class ShootingFinder:
             raise NotConverged(
                 "accuracy.method: the motion at the first frequency of the sweep grows for ever; change drive.from"
             )
-        self._equations = PeriodEquations(
+        self._equations = MotionCurve(
             lambda omega: self.make_case(replace(first, omega=omega)),
-            CurveStart(motion.run.final, first.omega),
+            motion.run.final,
+            first.omega,
             has_kinks=self.joints.has_kinks,
         )
         ends = 2 * np.pi * np.array([drive.low, drive.high])
@@ -594,7 +568,7 @@ class ShootingFinder:
     def _make_curve_point(self, point: PathPoint) -> CurvePoint:
         """Return the CurvePoint of a point that the continuation has found."""
         signal = self.model.rig.drive.signal
-        motion = point.equations.details
+        motion = point.motion
         regime = "stable" if motion.is_stable else "unstable"
         if not self.may_fold:
             regime = self._name_regime(motion, is_stuck=False) + ", unstable" * (
@@ -646,9 +620,7 @@ class ShootingFinder:
             return self._make_curve_point(point)
         omega = first.drive.omega + fraction * (second.drive.omega - first.drive.omega)
         sine = replace(first.drive, omega=omega)
-        guess = first.guess
-        if not self.draws_curve:
-            guess = periodic.interpolate_motions(first.guess, second.guess, fraction)
+        guess = first.guess if fraction < 0.5 else second.guess
         return self.compute_curve_point(sine, guess, needs_stability=self.draws_curve)
 
 
