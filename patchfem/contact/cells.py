@@ -89,10 +89,25 @@ class CellCompliance:
         return float(self.waves.mean() + np.mean(self.local))
 
     @cached_property
+    def _typical_local(self) -> float:
+        """Local compliance [m/Pa] of a typical cell: the harmonic mean, because weakly loaded bonds are very soft."""
+        is_soft = np.greater(self.local, 0)
+        return 1 / float(np.mean(1 / np.asarray(self.local)[is_soft])) if is_soft.any() else 0.0
+
+    @cached_property
     def _stiffness(self) -> np.ndarray:
-        """Traction per displacement (ny, nx) [Pa/m] of each wave, with the mean local compliance; 0 for rigid waves."""
-        compliance = self.waves + np.mean(self.local)
+        """Traction per displacement (ny, nx) [Pa/m] of each wave, with a typical local compliance; 0 for rigid waves."""
+        compliance = self.waves + self._typical_local
         return np.divide(1, compliance, out=np.zeros(self.shape), where=compliance > 0)
+
+    @cached_property
+    def _softness_factor(self) -> np.ndarray | float:
+        """Square root of the own compliance of a typical cell over that of each cell; 1 for rigid cells."""
+        own = self.waves.mean()
+        typical = self._typical_local
+        if own + typical == 0:
+            return 1.0
+        return np.sqrt((own + typical) / (own + np.where(self.local, self.local, typical)))
 
     def product(self, traction: np.ndarray) -> np.ndarray:
         """Return the displacement (ny, nx) [m] of the cells under a traction (ny, nx) [Pa]."""
@@ -103,7 +118,8 @@ class CellCompliance:
 
     def precondition(self, displacement: np.ndarray) -> np.ndarray:
         """Return about the traction (ny, nx) [Pa] that displaces all cells of a guided block by (ny, nx) [m]."""
-        return _multiply_waves(self._stiffness, displacement)
+        factor = self._softness_factor
+        return factor * _multiply_waves(self._stiffness, factor * displacement)
 
     def __matmul__(self, force: np.ndarray) -> np.ndarray:
         """Return the displacement (m,) [m] under forces (m,) [N] on the m = ny nx cells, as a matrix does."""
