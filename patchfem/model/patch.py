@@ -102,6 +102,11 @@ class PatchPieces:
         return self.lower.length > limit or self.upper.length > limit
 
     @property
+    def flat_half_length(self) -> float:
+        """Half the length [m] of the part of the interface on which both faces are flat."""
+        return min(piece.length / 2 - piece.end.size for piece in self.both)
+
+    @property
     def surface_modulus(self) -> float:
         """Combined modulus E* [Pa] of the two surfaces, 1/E* = sum of (1 - nu^2)/E."""
         faces = [piece.face_material for piece in self.both]

@@ -1,7 +1,5 @@
 """Grids and elastic layers of the two pieces of a patch, generated or from a mesh file."""
 
-from typing import NamedTuple
-
 from .. import closed_forms, elasticity
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
@@ -15,18 +13,6 @@ from .source import name_key
 # Largest difference of equal sizes, as a fraction of the interface length; mesh files
 # contain coordinates of few digits.
 EQUAL_SIZES_TOL = 1e-6
-
-
-class RoundedEdges(NamedTuple):
-    """Positions at which the flat face and the contact of two rounded pieces end.
-
-    - positions: ends [m] of the contact and of the flat part, in rising order; () without rounded
-      ends.
-    - distance: distance [m] between the end of the flat part and the end of the contact.
-    """
-
-    positions: tuple[float, ...] = ()
-    distance: float | None = None
 
 
 def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
@@ -82,34 +68,23 @@ def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: 
     return grid.extend(piece.length, piece.end, growth) if patch.pieces.has_overhang else grid
 
 
-def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
-    """Return where the flat part and the contact of rounded pieces end.
+def estimate_rounded_length(patch: PatchModel) -> float:
+    """Return the length [m] of the contact on each rounded end of the pieces.
 
-    The contact is that of a rounded punch on a half plane under the nominal load without tilt (`closed_forms.contact`).
-    The faces are as stiff as their coatings.
-
-    Parameters
-    ----------
-    patch : PatchModel
-        Patch whose pieces may have rounded ends.
-
-    Returns
-    -------
-    RoundedEdges
-        Positions x [m], or empty if no piece is rounded or there is no load.
+    It is that of a rounded punch on a half plane, as stiff as the coatings, under the nominal load without tilt; 0 if no
+    piece is rounded or there is no load.
     """
     pieces = patch.pieces.both
     half_length = patch.pieces.length / 2
     radii = [piece.end.size for piece in pieces if piece.corner_kind(half_length) == "radius"]
     load = patch.nominal_load / (patch.pieces.width * patch.pieces.pairs)
     if not radii or not load > 0:
-        return RoundedEdges()
-    flat = min(piece.length / 2 - piece.end.size for piece in pieces)
+        return 0.0
+    flat = patch.pieces.flat_half_length
     modulus = patch.pieces.surface_modulus
     radius = 1 / sum(1 / radius for radius in radii)
     half_width = closed_forms.contact.rounded_punch_half_width(load, flat, radius, modulus)
-    half_width = min(half_width, half_length)
-    return RoundedEdges((-half_width, -flat, flat, half_width), half_width - flat)
+    return min(half_width, half_length) - flat
 
 
 def make_piece_meshes(patch: PatchModel) -> "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]":

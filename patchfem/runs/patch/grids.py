@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
+from math import copysign
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from ...core import PatchfemError
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.grid import TensorGrid
 from ...model.patch import PatchModel
-from ...model.pieces import extend_grid, find_rounded_edges
+from ...model.pieces import estimate_rounded_length, extend_grid
 from . import slip_zones, store
 from .condensed import CondensedPair, condense
 from .press import Patch, PressedCases, solve_patch_contact
@@ -281,7 +282,16 @@ def _resolves_contact(patch_model, x, layout: Layout, zones: Pairs) -> bool:
     has_waves = _max_wave_cell(patch_model) < np.inf and x.size <= MAX_GRID_COLUMNS
     if has_waves and not _resolves_span(layout, x, MAX_WAVE_CELL_RATIO, (x[0], x[-1])):
         return False
+    zones = (*zones, *_list_rounded_zones(patch_model, layout))
     return all(_resolves_span(layout, x, MAX_SLIP_ZONE_CELL_RATIO, zone) for zone in zones)
+
+
+def _list_rounded_zones(patch_model, layout: Layout) -> Pairs:
+    """Return the (start, end) [m] of the parts of rounded ends to which a layout is graded."""
+    flat = patch_model.pieces.flat_half_length
+    return tuple(
+        (low, high) for low, high, _ in layout.bands if low < high and flat in (-high, low)
+    )
 
 
 def _max_wave_cell(patch_model) -> float:
@@ -336,10 +346,17 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     step_cell = min_cell / EDGE_TO_GAP_STEP_CELL_RATIO
     bands += _make_point_bands(patch_model.gap.step_edges, step_cell)
 
-    rounded_edges, rounding_length = find_rounded_edges(patch_model)
-    for place in rounded_edges:
-        if span[0] - min_cell <= place <= span[1] + min_cell:
-            bands.append((place, place, min(min_cell, rounding_length / 4)))
+    # The contact on a rounded end has as many cells as a slip zone. On longer cells the contact may end one cell before it.
+    reach = max(extent.cell for extent in extents)
+    flat = patch_model.pieces.flat_half_length
+    rounding = estimate_rounded_length(patch_model)
+    for side, end in zip((-1, 1), span) if rounding else ():
+        rounded = side * end - flat
+        if rounded >= -reach:
+            rounded = rounded if rounded > 0 else rounding
+            low, high = sorted((side * flat, side * (flat + rounded)))
+            cell = max(rounded / N_CELLS_PER_SLIP_ZONE, MIN_CELL_LENGTH_RATIO * length)
+            bands.append((low, high, min(min_cell, cell)))
 
     # The half-width of a pressure maximum on a wavy surface, and a slip zone, are divided into at least
     # N_CELLS_PER_PRESSURE_HALF_WIDTH and N_CELLS_PER_SLIP_ZONE cells.
@@ -514,10 +531,14 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     -------
     list of TensorGrid
     """
-    x = divide_into_columns(layout, patch_model.gap.step_edges)
+    # A node lies at each step, and where a flat part ends: the slope of the pressure is unbounded there.
+    flat = patch_model.pieces.flat_half_length
+    rounded = _list_rounded_zones(patch_model, layout)
+    nodes = {*patch_model.gap.step_edges, *(copysign(flat, low) for low, _ in rounded)}
+    x = divide_into_columns(layout, nodes)
     while x.size > MAX_GRID_COLUMNS + 1 and layout.bands:
         layout = layout.scale_cells(x.size / MAX_GRID_COLUMNS)
-        x = divide_into_columns(layout, patch_model.gap.step_edges)
+        x = divide_into_columns(layout, nodes)
     first_row = float(np.diff(x).min())
     length = patch_model.pieces.length
     growth = choose_density(patch_model).cell_growth

@@ -31,6 +31,10 @@ KINDS = {
         PATCH + '[contact.upper]\nsubstrate = "steel"\n',
         ["--over", "contact.load=20 N..900 N:{n}"],
     ),
+    "rounded": (
+        PATCH + '[contact.upper]\nend_radius = "1 mm"\n',
+        ["--over", "contact.load=20 N..900 N:{n}"],
+    ),
     "thickness": (PATCH, ["--over", "contact.coating.thickness=0.1 mm..0.4 mm:{n}"]),
     "profile": (
         PATCH + '[contact.profile]\nfile = "a.csv"\n',
