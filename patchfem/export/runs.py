@@ -108,7 +108,7 @@ def make_command(verb: str, path: Path, sets: tuple[str, ...], options: Sequence
     words = ["patchfem", verb, name]
     for assignment in sets:
         key, _, value = assignment.partition("=")
-        words += ["--set", f"{key}={Path(value).name if value.startswith('/') else value}"]
+        words += ["--set", f"{key}={Path(value).name if Path(value).is_absolute() else value}"]
     return shlex.join([*words, *options])
 
 
