@@ -82,7 +82,7 @@ def run_into(
         try:
             result = run(run_plan, report, progress, fresh=fresh, state_file=state_file)
         except NotConverged as error:
-            result = _partial_result(error)
+            result = _extract_partial_result(error)
         answer = write_results(result, folder.path)
         fault = draw_page(folder.path) if has_page else None
     return WrittenRun(answer, result, fault)
@@ -100,7 +100,7 @@ def draw_page(folder: Path) -> BaseException | None:
     return None
 
 
-def _partial_result(error: NotConverged) -> Result:
+def _extract_partial_result(error: NotConverged) -> Result:
     """Return what a run that did not converge has computed, with the reason as a warning.
 
     NotConverged is raised again if it has computed nothing.

@@ -95,7 +95,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
             values = {key: mean.mean for key, mean in averages.items()}
             state = f"Mean of {len(members)} {name}: "
         headlines.append(f"{state}{_format_main_parameters(values, members)}.")
-        quantities |= shared.to_answers(values)
+        quantities |= shared.convert_quantities(values)
 
     # A treatment that several surfaces share is named once, after the headlines.
     notes = [text for report in reports for text in report.notes]
@@ -216,7 +216,7 @@ def report_to_dict(roughness: RoughnessReport) -> JsonObject:
         "profile",
         roughness,
         confidence=TRACE_INTERVAL_PROBABILITY if has_interval else None,
-        measures=shared.to_answers({value.name: value for value in roughness.values}),
+        measures=shared.convert_quantities({value.name: value for value in roughness.values}),
     )
     if roughness.kind == "areal":
         return content

@@ -188,7 +188,7 @@ def write_tables(
         return None
 
     folder.remove_tables("sweep.csv", answers.PAGE_FILE)
-    names = folder.case_folder_names()
+    names = folder.list_case_folder_names()
     if is_collected or len(table) <= MAX_CASES_WITH_TABLES:
         write_csv(cases, table, names, folder.target / "sweep.csv")
     answers.write_answer(make_answer(sweep_scene, cases, table, names), folder.target)
