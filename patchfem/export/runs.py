@@ -24,7 +24,7 @@ MIN_STIFFNESS_TO_ERROR = 10.0
 RECORDED_PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
-def make_answer(result: Result) -> Answer:
+def make_run_answer(result: Result) -> Answer:
     """Return the answer of a run: its measures, verdict, arrays and warnings, from its result."""
     run_plan = result.plan
     source = run_plan.model.source

@@ -62,7 +62,7 @@ def answer_files(
             "compare: piece needs predicted, the results folder of a run with [wear]"
         )
     comparison = compare.compare_files(before, after, options)
-    answer = make_answer(comparison)
+    answer = make_comparison_answer(comparison)
     if predicted is None:
         return answer
     return worn.add_predicted(answer, comparison, predicted, piece)
@@ -99,10 +99,10 @@ def compare_with_scene(
     """
     comparison = compare.compare_files(before, after, options)
     paths = pressing.write_common_traces(comparison, folder)
-    return _add_pressed(make_answer(comparison), run_surfaces(*paths))
+    return _add_pressed(make_comparison_answer(comparison), run_surfaces(*paths))
 
 
-def make_answer(comparison: Comparison) -> Answer:
+def make_comparison_answer(comparison: Comparison) -> Answer:
     """Return the answer of a comparison of two surfaces: its sentences, quantities, curves and content of compare.json."""
     words = shared.describe_comparison(comparison)
     surfaces = (comparison.before, comparison.after)

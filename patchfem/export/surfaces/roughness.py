@@ -73,10 +73,12 @@ def answer_files(paths: list[Path], units: tuple[str, str] | None = None, **opti
     PatchfemError
         If a file cannot be read or evaluated.
     """
-    return make_answer([report.make_report(read_surface(path, units), **options) for path in paths])
+    return make_roughness_answer(
+        [report.make_report(read_surface(path, units), **options) for path in paths]
+    )
 
 
-def make_answer(reports: list[RoughnessReport]) -> Answer:
+def make_roughness_answer(reports: list[RoughnessReport]) -> Answer:
     """Return the answer of the reports of one or several surfaces."""
     # Traces and scans have different parameters, so that each kind has its own headline.
     quantities, means, headlines, cautions = {}, [], [], []

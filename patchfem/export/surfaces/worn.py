@@ -354,10 +354,10 @@ def answer_runs(before: Path, after: Path) -> Answer:
         raise PatchfemError(
             f"{after}: this run has no [wear], so nothing wore off; give the run with [wear] as the second folder"
         )
-    return make_answer(runs, between_runs.measure_wear(runs[0].state, runs[1].state))
+    return make_wear_answer(runs, between_runs.measure_wear(runs[0].state, runs[1].state))
 
 
-def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
+def make_wear_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     """Return the answer on the wear of a patch between two runs: its sentences, quantities and curves."""
     verdict = describe_wear(runs, wear)
     # Measures and warnings of the run before and of the run after.
