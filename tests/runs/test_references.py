@@ -3,8 +3,8 @@
 The scenes of the folder `found` had errors that were too small in earlier versions. Those of its files
 `random_patches.json`, two of each kind, and `random_rigs.json`, some in time steps, were drawn by chance. Their references
 with uncertainties are those of elements of order 4 with an interior-point method and of DOP853 between located events
-(`patch_of_order_four.py` and `random_rigs.py` in `tests/support` of version 1.10). The rigs `bolted` were computed with partial
-slip event by event and harmonic balance (`block_joint.py` and `bolted_rigs.py` in `tests/support` of version 2.1.0).
+(`patch_of_order_four.py` and `random_rigs.py` in `tests/support` of version 1.10). The rigs `bolted` were computed with
+partial slip event by event and harmonic balance (`block_joint.py` and `bolted_rigs.py` of version 2.1.0).
 """
 
 from pathlib import Path
