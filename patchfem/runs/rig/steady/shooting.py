@@ -22,7 +22,7 @@ from ....hybrid.periodic_curves import (
     PathSettings,
     measure_distance,
 )
-from ....hybrid.records import Probe, State, Status, Window
+from ....hybrid.records import Probe, Status, Window
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ....response.spectrum import make_acceleration_measures
@@ -57,9 +57,6 @@ N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is co
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 MAX_BRACKET_STEPS = (
     8  # steps, each twice as long as the one before, beyond which no maximum is looked for
-)
-harmonic_balance.N_FIRST_CYCLES = (
-    3  # cycles before the first correction of a motion that starts from the first-harmonic balance
 )
 # Relative distance from its friction limit at which an interface slips as a whole
 FULL_SLIP_TOL = 1e-9
@@ -112,8 +109,8 @@ class ShootingFinder:
         ----------
         drive : SineDrive
             Amplitude [m s-2] and angular frequency [rad/s].
-        guess : PeriodicMotion, optional
-            Similar motion.
+        guess : PeriodicMotion or State, optional
+            Similar motion, or its state.
         needs_stability : bool
             Whether multipliers and errors are needed. Without them a change over a period of MAX_KINKED_CHANGE counts as
             none, and a motion that is found from a guess takes a few periods.
@@ -126,14 +123,10 @@ class ShootingFinder:
         # A damped motion whose stability does not matter follows from its guess in a few periods; any other is searched.
         case = self.make_case(drive)
         is_undamped = self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL
-        if isinstance(guess, State):
-            motion = periodic.find_periodic_motion(
-                case, start=guess, n_first=harmonic_balance.N_FIRST_CYCLES, odd_laws=self.odd_laws
-            )
-        elif guess is None or needs_stability or is_undamped:
+        if guess is None or needs_stability or is_undamped:
             motion = periodic.find_periodic_motion(
                 case,
-                start=guess and guess.run.final,
+                start=guess.run.final if isinstance(guess, periodic.PeriodicMotion) else guess,
                 n_first=periodic.N_FIRST_CYCLES if guess is None else 1,
                 has_kinks=self.joints.has_kinks,
                 is_undamped=is_undamped,
@@ -519,8 +512,7 @@ class ShootingFinder:
             if heights[k] < harmonic_balance.MIN_HEIGHT_RATIO * highest:
                 break
             sine = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
-            start = balanced.make_start(self.make_case(sine), k)
-            top = self.compute_curve_point(sine, start, needs_stability=False)
+            top = self._compute_balanced_point(sine, balanced)
             points.append(top)
 
             # Outwards from the estimate, in steps of twice the length, until the amplitude falls on both sides
@@ -531,15 +523,18 @@ class ShootingFinder:
                 )
                 while last.drive.omega != end:
                     place = float(np.clip(last.drive.omega + step, omega[0], omega[-1]))
-                    point = self.compute_curve_point(
-                        replace(sine, omega=place), last.guess, needs_stability=False
-                    )
+                    point = self._compute_balanced_point(replace(sine, omega=place), balanced)
                     points.append(point)
                     if point.values[AMPLITUDE] < last.values[AMPLITUDE]:
                         break
                     last = point
                     step *= 2
         return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
+
+    def _compute_balanced_point(self, drive, balanced) -> CurvePoint:
+        """Return the curve point of a drive, found from `BalancedMotions` beside its frequency."""
+        start = balanced.make_start(self.make_case(drive))
+        return self.compute_curve_point(drive, start, needs_stability=False)
 
     def _follow_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation along its arc length, through its folds."""
