@@ -114,7 +114,6 @@ def find_periodic_motion(
     start: State | None = None,
     has_kinks: bool = False,
     is_undamped: bool = False,
-    odd_laws: Sequence[LawNumbers] = (),
 ) -> PeriodicMotion:
     """Find the periodic motion that follows some first cycles of a case.
 
@@ -132,8 +131,6 @@ def find_periodic_motion(
     is_undamped : bool
         Whether a free motion without friction does not decay. A motion from rest that grows for ever is then found first,
         because the periods of a growing motion would lead nowhere.
-    odd_laws : sequence of LawNumbers
-        Laws of a rig whose motions are symmetric, see `Shooting`.
 
     Raises
     ------
@@ -141,7 +138,7 @@ def find_periodic_motion(
         If the search needs too many steps.
     """
     growth = _measure_growth(case) if is_undamped and start is None else None
-    shooting = Shooting(case, odd_laws)
+    shooting = Shooting(case)
     if start is not None:
         shooting.state = start
     if growth is None or not growth.size:
@@ -227,14 +224,14 @@ def follow_periodic_motion(
     """Find the periodic motion of a case from that of a similar case, without its stability and the error of its state.
 
     The derivatives of the similar motion serve as long as the corrections with them converge, so that the motion after a
-    small change of the case takes four periods. A fit computes its motions in this way.
+    small change takes four periods.
 
     Parameters
     ----------
     case : Case
         Its start and schedule are not used.
     near : PeriodicMotion or State
-        Motion of a similar case, in which no motion grows for ever, or a state near the start of the motion.
+        Similar motion that does not grow, or a state near the start of the motion.
     odd_laws : sequence of LawNumbers
         Laws of a rig whose motions are symmetric, see `Shooting`.
 
@@ -636,10 +633,7 @@ class Shooting:
             return np.full(change.size, np.nan), np.inf
         # A state that nothing determines, such as that of an interface at rest, has no error.
         step = _solve_newton(found, change, NEUTRAL_TOL)
-        multipliers = np.linalg.eigvals(found.slopes)
-        if self.odd_laws:
-            multipliers = multipliers**2
-        return multipliers, float(np.abs(step).max(initial=0.0))
+        return np.linalg.eigvals(found.slopes), float(np.abs(step).max(initial=0.0))
 
     def correct(self, before: State) -> None:
         """Replace the state by a Newton step from another one, which a period takes to it.

@@ -86,12 +86,12 @@ class ShootingFinder:
         self.may_fold = may_fold(model)
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
         laws = [law for law, _ in self.joints.laws]
-        self.odd_laws = ()
-        if all(law.law == "masing" for law in laws) and not model.rig.springs.is_nonlinear:
-            self.odd_laws = laws
-        is_smooth = any(masing.has_power_law(law) for law in laws)
-        is_smooth &= all(law.law == "masing" for law in laws)
-        self.follows_curve = self.may_fold or (is_smooth and self._max_growth_rate < 0)
+        have_elements = all(law.law == "masing" for law in laws)
+        self.odd_laws = laws if have_elements and not model.rig.springs.is_nonlinear else ()
+        is_smooth = have_elements and any(masing.has_power_law(law) for law in laws)
+        self.follows_curve = self.may_fold or (
+            self.draws_curve and is_smooth and self._max_growth_rate < 0
+        )
         self.evaluator = LumpedEvaluator(model, self.numerics, patch, self.joints)
 
     def make_case(self, drive) -> cases.Case:
@@ -455,7 +455,7 @@ class ShootingFinder:
         return float(np.linalg.eigvals(state).real.max())
 
     def trace_curve(self, drive) -> ResponseCurve:
-        """Compute the response curve over frequency, by continuation if it may have folds or if the law is Iwan's.
+        """Compute the response curve over frequency, by continuation if it may have folds or if that of Iwan's law is drawn.
 
         Other curves start with N_SWEEP_POINTS frequencies and the natural frequencies. Each point starts from the motion at
         the previous one. The curve is refined until linear interpolation has an error of at most INTERPOLATION_TOL.
@@ -494,7 +494,7 @@ class ShootingFinder:
             Its amplitude and its range of frequencies.
         """
         laws = self.odd_laws
-        if not laws or self.joints.has_kinks or self._max_growth_rate >= 0:
+        if not laws or self._max_growth_rate >= 0:
             return []
         omega = 2 * np.pi * np.sort(choose_start_frequencies(self.modes, drive))
         balanced = harmonic_balance.balance_first_harmonic(
