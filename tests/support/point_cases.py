@@ -14,8 +14,13 @@ MANY = 64  # number of cases of a study of which points are marched together
 SCENE = (
     '[normal]\nload = "30 N"\n[friction]\n{law}\n'
     + MODE
-    + '[drive]\nkind = "base"\nacceleration = "5 g"\nfrequency = "140 Hz"\ncycles = 60\n'
+    + '[drive]\n{drive}\nfrequency = "140 Hz"\ncycles = 60\n'
 )
+DRIVES = {
+    "drive.acceleration": 'kind = "base"\nacceleration = "5 g"',
+    "drive.force": 'kind = "force"\nforce = "50 N"',
+}
+FORCED = ("weakening", "tanh")  # laws of the rigs that a force drives; a base moves the others
 LAWS = {
     "coulomb": 'law = "coulomb"\nstatic = 0.3',
     "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2',
@@ -35,7 +40,8 @@ def draw_points(law: str, seed: int, count: int, tolerance: float = 1e-3) -> lis
     They range from permanent sliding to sticking, near resonance and away from it.
     """
     r = np.random.default_rng(seed)
-    base = get_base_scene(pf.load(SCENE.format(law=LAWS[law])))
+    level = "drive.force" if law in FORCED else "drive.acceleration"
+    base = get_base_scene(pf.load(SCENE.format(law=LAWS[law], drive=DRIVES[level])))
     out = []
     while len(out) < count:
         push = 10 ** r.uniform(0.3, 2)
@@ -43,7 +49,7 @@ def draw_points(law: str, seed: int, count: int, tolerance: float = 1e-3) -> lis
             "normal.load": push * 10 ** r.uniform(-1, 0.5),
             "drive.frequency": r.uniform(50, 400),
             "structure.mode.axial.damping": 10 ** r.uniform(-2.5, -0.5),
-            "drive.acceleration": push,
+            level: push,
             "structure.mode.axial.slide": float(r.choice([1, -0.7])),
             "structure.mode.axial.output": float(r.choice([1, -1.3])),
             "accuracy.tolerance": tolerance,
