@@ -289,9 +289,7 @@ def _resolves_contact(patch_model, x, layout: Layout, zones: Pairs) -> bool:
 def _list_rounded_zones(patch_model, layout: Layout) -> Pairs:
     """Return the (start, end) [m] of the parts of rounded ends to which a layout is graded."""
     flat = patch_model.pieces.flat_half_length
-    return tuple(
-        (low, high) for low, high, _ in layout.bands if low < high and flat in (-high, low)
-    )
+    return tuple(band[:2] for band in layout.bands if flat in (band[0], -band[1]))
 
 
 def _max_wave_cell(patch_model) -> float:
