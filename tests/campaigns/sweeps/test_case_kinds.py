@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import run_cli
-from point_cases import LAWS, MANY, SCENE
+from point_cases import DRIVES, LAWS, MANY, SCENE
 from scene_texts import BLOCK, COATING, COULOMB, MODE, POINT
 from sweep_tables import read_rows
 
@@ -84,7 +84,7 @@ KINDS = {
     "table": (PATCH, ["--cases", "cases.csv"]),
     **{
         law: (
-            SCENE.format(law=text),
+            SCENE.format(law=text, drive=DRIVES["drive.acceleration"]),
             [
                 "--over",
                 "friction.static=0.25..0.5",
