@@ -453,7 +453,7 @@ def cost(
     model = build(scene, **sets)
     over = numerical_settings.SCENE_KEYS.get(_require_string(over, "cost: over"), over)
     report = _print_to_stderr if say is None else say
-    answer = costs.make_answer(cost_curves.compute_costs(model, over, report), model)
+    answer = costs.make_cost_answer(cost_curves.compute_costs(model, over, report), model)
     if out is not None:
         _save(lambda _: answer, out)
     return answer.details
@@ -1509,7 +1509,7 @@ class Plots:
 
         `titles` are those of the charts, and `name` is that of the method, for the message.
         """
-        answer = runs.make_answer(self._result)
+        answer = runs.make_run_answer(self._result)
         axes_of_chart = chart_axes.draw_charts(answer, titles, ax, f"plot.{name}")
         if axes_of_chart is None:
             raise PatchfemError(f"plot.{name}: nothing to draw: {reason}")
@@ -1535,7 +1535,7 @@ class Result(run_result.Result):
 
     def _repr_html_(self) -> str:
         """Return the HTML representation for notebooks: outcome, headline, measures and warnings."""
-        answer = runs.make_answer(self)
+        answer = runs.make_run_answer(self)
         rows = ""
         for name, text in show.list_quantities(answer.quantities):
             rows += (
@@ -1569,7 +1569,7 @@ class Result(run_result.Result):
 
     def to_xarray(self) -> Dataset:
         """Return the time histories and fields of the run with units and scene, as in result.nc."""
-        return netcdf.to_dataset(runs.make_answer(self))
+        return netcdf.to_dataset(runs.make_run_answer(self))
 
     def to_pyvista(self, frame: int | None = -1) -> Any:
         """Return both pieces and their interface as PyVista grids, with the fields of fields.vtkhdf.

@@ -325,7 +325,7 @@ def measure_names(sources: list, root: Path) -> frozenset:
             continue
         for node in source.nodes:
             if isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
-                if getattr(node.func, "id", "") in ("MeasureDefinition", "_random_rows"):
+                if getattr(node.func, "id", "") in ("MeasureDefinition", "_make_random_rows"):
                     names.add(node.args[0].value)
     return frozenset(names)
 

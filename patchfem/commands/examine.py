@@ -2,11 +2,11 @@
 
 import os
 import sys
-from importlib.metadata import PackageNotFoundError, version
 from shutil import which
 from typing import NamedTuple
 
 from .. import __version__, compiled
+from ..disk.installed import find_package_version
 
 # Packages that pyproject.toml requires; an older installation may lack new ones.
 REQUIRED_PACKAGES = (
@@ -76,17 +76,9 @@ def _check_package(name: str, label: str, source: str, remark: str) -> Finding:
     remark : str
         Text that follows the words for a missing package.
     """
-    version = _find_version(name)
+    version = find_package_version(name)
     cure = "" if version else f"pip install {source}"
     return Finding(label, bool(version), version or f"not installed{remark}", cure)
-
-
-def _find_version(name: str) -> str:
-    """Return the version of the package `name`, or "" if it is not installed."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return ""
 
 
 def _check_cache() -> Finding:
@@ -112,10 +104,9 @@ def _count_threads() -> Finding:
 
 def _check_films() -> Finding:
     """Check whether a film of the last cycle can be written as .mp4 (patchfem view)."""
-    version = _find_version("imageio-ffmpeg")
-    if which("ffmpeg"):
-        return Finding("films (.mp4)", True, "by ffmpeg", "")
-    if version:
-        return Finding("films (.mp4)", True, f"imageio-ffmpeg {version}", "")
+    version = find_package_version("imageio-ffmpeg")
+    if which("ffmpeg") or version:
+        found = "by ffmpeg" if which("ffmpeg") else f"imageio-ffmpeg {version}"
+        return Finding("films (.mp4)", True, found, "")
     cure = "run pip install imageio-ffmpeg, or write .gif or .html, which need no ffmpeg"
     return Finding("films (.mp4)", False, "neither ffmpeg nor imageio-ffmpeg, optional", cure)

@@ -1,7 +1,6 @@
 """The command that reads measured surfaces and prints their roughness."""
 
 import json
-import os
 import re
 import tomllib
 from dataclasses import asdict
@@ -107,7 +106,7 @@ def _print_split(
     """
     target = scene_path if out is None else out
     refuse_existing(out)
-    relative_path = Path(os.path.relpath(trace, target.parent)).as_posix()
+    relative_path = toml_text.name_file(trace, target.parent)
     text = toml_text.read_text(scene_path)
     if scene.loads(text, target).contact is None:
         raise UsageError(

@@ -58,7 +58,7 @@ def cost(
         curves = cost_curves.compute_costs(
             scene_model, over, report, varies_all=output_options.verbose
         )
-        return costs.make_answer(curves, scene_model)
+        return costs.make_cost_answer(curves, scene_model)
 
     save(measure_costs, output)
 

@@ -98,10 +98,9 @@ def compute_kernel_key() -> str:
 
 def _describe_cpu() -> str:
     """Return the model of the CPU and its instruction sets."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor()
+    lines = []
+    with suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
     # The flags are needed because a virtual machine may hide some instruction sets of a CPU model.
     names = ("model name", "flags", "Features")
     descriptions = [line for line in dict.fromkeys(lines) if line.startswith(names)]

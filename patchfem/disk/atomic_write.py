@@ -9,7 +9,6 @@ import errno
 import os
 import re
 import secrets
-import stat
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -40,8 +39,8 @@ def write_atomically(path) -> Iterator[Path]:
             f"{format_path(path)}: cannot be written, because this is a folder; name a file"
         )
 
-    # A rename would put a file in the place of a device
-    is_special = _is_special(path)
+    # A rename would put a file in the place of a device or a pipe
+    is_special = os.path.exists(path) and not os.path.isfile(path)
     partial = path if is_special else make_partial_path(path)
     try:
         yield partial
@@ -120,8 +119,9 @@ def explain_mkdir_error(error: OSError) -> str:
         return "the name of the folder is longer than the disk allows; give a shorter name with -o"
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         path = Path(error.filename or "")
-        files = [format_path(part) for part in (path, *path.parents) if part.is_file()]
-        return f"{files[0]} is a file; choose another folder" if files else str(error.strerror)
+        for part in (path, *path.parents):
+            if part.is_file():
+                return f"{format_path(part)} is a file; choose another folder"
     return str(error.strerror)
 
 
@@ -192,12 +192,3 @@ def open_lossy(path) -> Iterator[LossyFile]:
         yield lossy
         if lossy.error is not None:
             raise lossy.error
-
-
-def _is_special(path: Path) -> bool:
-    """Return whether the path is a device or a pipe, which must not be replaced by a file."""
-    try:
-        mode = os.stat(path).st_mode
-    except OSError:
-        return False
-    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))

@@ -19,11 +19,8 @@ def iterate_texts(value) -> Iterator[str]:
     """Iterate over all strings in a value of TOML, such as the tables of a scene, in their order."""
     if isinstance(value, str):
         yield value
-    elif isinstance(value, dict):
-        for item in value.values():
-            yield from iterate_texts(item)
-    elif isinstance(value, list):
-        for item in value:
+    elif isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
             yield from iterate_texts(item)
 
 
@@ -49,7 +46,7 @@ def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
     for name in names:
         for folder in folders:
             path = os.path.join(folder, name)
-            if _is_file(path):
+            if os.path.isfile(path):
                 hashes.append([name, sha256(Path(path).read_bytes()).hexdigest()])
     return hashes
 
@@ -62,11 +59,3 @@ def _iterate_candidate_names(text: str) -> Iterator[str]:
         yield double_quoted or single_quoted
     for part in _SEPARATOR_PATTERN.split(text):
         yield part.strip()
-
-
-def _is_file(path: str) -> bool:
-    """Return whether a path is a file; a string with a null byte never is."""
-    try:
-        return os.path.isfile(path)
-    except ValueError:
-        return False

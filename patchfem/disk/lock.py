@@ -10,30 +10,42 @@ from pathlib import Path
 
 from ..core import Missing
 
+try:
+    import fcntl
+except ImportError:  # Windows, which has msvcrt
+    fcntl = None
+
 MAX_LOCK_BYTES = 20  # number of bytes that are read of a lock file
 
 
 def lock_file(file: int) -> bool:
     """Lock an open file by its descriptor, and return False if another process holds the lock.
 
-    The operating system releases the lock when the file is closed, also of a process that is killed. A system or a disk
-    without locks lets all processes through.
+    The operating system releases the lock when the file is closed, also of a process that is killed. A disk without
+    locks lets all processes through.
     """
     try:
-        import fcntl
+        if fcntl:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        else:
+            import msvcrt
 
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+            # Windows lets nobody read a locked byte, so that it lies behind those that are read.
+            os.lseek(file, MAX_LOCK_BYTES, os.SEEK_SET)
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+    except (BlockingIOError, PermissionError):
         return False
-    except (ImportError, OSError):  # Windows, or a disk that supports no locks
-        return True
+    except (ImportError, OSError):  # a disk that supports no locks
+        pass
+    finally:
+        os.lseek(file, 0, os.SEEK_SET)
     return True
 
 
 class FolderLock:
     """Lock file that a process holds while it writes to a folder.
 
-    A system or a disk without locks lets all writers through.
+    A disk without locks lets all writers through.
 
     Parameters
     ----------
@@ -89,19 +101,24 @@ class FolderLock:
         )
 
     def release(self) -> None:
-        """Remove the file, unless it is that of another writer, and then unlock it."""
+        """Unlock the file and remove it, unless it is that of another writer."""
         if self.file < 0:
             return
         with suppress(OSError):
-            if _is_same_file(self.file, self.path):
+            if fcntl and _is_same_file(self.file, self.path):
                 self.path.unlink()
         os.close(self.file)
         self.file = -1
 
+        # Windows removes no open file, not even that of the next owner.
+        if not fcntl:
+            with suppress(OSError):
+                self.path.unlink()
+
 
 def _is_same_file(file: int, path: Path) -> bool:
-    """Return whether a path is that of an open file."""
+    """Return whether a path is that of an open file, which nobody can remove on Windows."""
     try:
-        return os.path.samestat(os.fstat(file), os.stat(path))
+        return not fcntl or os.path.samestat(os.fstat(file), os.stat(path))
     except FileNotFoundError:
         return False

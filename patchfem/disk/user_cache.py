@@ -35,7 +35,7 @@ def prepare_folder(folder: Path) -> str:
     """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if os.name != "nt":
+        if hasattr(os, "geteuid"):  # not on Windows, where a home folder is the user's own
             for checked in (folder.parent, folder):
                 if reason := _find_distrust_reason(checked):
                     return reason

@@ -55,7 +55,7 @@ class Quantity:
     def __post_init__(self):
         # numbers that are not finite have no JSON form
         for name in ("value", "error", "low", "high"):
-            object.__setattr__(self, name, _finite_or_none(getattr(self, name)))
+            object.__setattr__(self, name, _convert_to_finite(getattr(self, name)))
         if self.low is None and self.high is None and None not in (self.value, self.error):
             object.__setattr__(self, "low", self.value - self.error)
             object.__setattr__(self, "high", self.value + self.error)
@@ -67,7 +67,7 @@ class Quantity:
         return content | ({"reason": self.reason} if self.reason else {})
 
 
-def _finite_or_none(number: float | None) -> float | None:
+def _convert_to_finite(number: float | None) -> float | None:
     """Return a number as float, or None if it is missing, not finite, or too large for a float."""
     if number is None:
         return None
@@ -199,7 +199,7 @@ def to_plain(content):
         return {key: to_plain(entry) for key, entry in content.items()}
     if isinstance(content, list | tuple):
         return [to_plain(entry) for entry in content]
-    return _finite_or_none(content) if isinstance(content, float) else content
+    return _convert_to_finite(content) if isinstance(content, float) else content
 
 
 @dataclass(frozen=True, slots=True)

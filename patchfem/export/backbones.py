@@ -66,11 +66,11 @@ def compute_answer(
     """
     cases = compute_cases(build, request, progress)
     if cases.axis is None:
-        return make_answer(cases.backbones[0], cases.source)
+        return make_backbone_answer(cases.backbones[0], cases.source)
     return _make_cases_answer(cases)
 
 
-def make_answer(backbone: Backbone, source: Source) -> Answer:
+def make_backbone_answer(backbone: Backbone, source: Source) -> Answer:
     """Return the answer of one backbone: frequency, damping and force of a mode against its amplitude.
 
     `source` is the scene of the mode.

@@ -67,7 +67,7 @@ class Row(NamedTuple):
         return self.worst.judge(self.run.tolerance)
 
 
-def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
+def make_cost_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     """Return the answer of the command `cost`: the CPU time and the accuracy of runs of a scene.
 
     Parameters

@@ -78,7 +78,7 @@ def compute_answer(
         For input that cannot be used, before anything is computed.
     """
     fitted = fit_measurement(scene, to, parse_ranges(free), options, listener)
-    answer = make_answer(fitted)
+    answer = make_fit_answer(fitted)
     text = format_fitted_scene(fitted, answer.verdict, folder)
     write_text(folder / FITTED_SCENE_FILE, text)
     return answer
@@ -99,7 +99,7 @@ class Parts(NamedTuple):
     details: JsonObject
 
 
-def make_answer(fitted: FittedKeys) -> Answer:
+def make_fit_answer(fitted: FittedKeys) -> Answer:
     """Return the answer of a fit from its fitted values and its measurement."""
     comparison = fitted.comparison
     parts = _DESCRIBE_FUNCTIONS[type(comparison)](fitted)

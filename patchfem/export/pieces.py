@@ -14,7 +14,7 @@ from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_atomically
 from ..formatting import choose_axis_unit
 from .charts.axes import save_figure
-from .fields.film import contact_window, last_frames
+from .fields.film import find_contact_window, select_last_frames
 from .fields.vtkhdf import VTK_FIELDS, Frames, collect_frames
 
 FILM_ENDINGS = (".gif", ".mp4", ".html")
@@ -104,8 +104,8 @@ def magnify_pieces(
     width, depth = high - low
     if magnify is None:
         seen = all_motion[:, cells[is_inside], 1]
-        magnify = _visible_factor(DRAWN_MOTION_FRACTION * depth, seen)
-    slide_factor = min(magnify, 1.0) * _visible_factor(DRAWN_SLIDE_FRACTION * width, slide)
+        magnify = _choose_visible_factor(DRAWN_MOTION_FRACTION * depth, seen)
+    slide_factor = min(magnify, 1.0) * _choose_visible_factor(DRAWN_SLIDE_FRACTION * width, slide)
     places = points + magnify * all_motion
     places[:, len(lower.points) :, 0] += slide_factor * slide[:, None]
     slid = ", slide of {:.3g} um × {:g}" if slide.any() else ""
@@ -113,7 +113,7 @@ def magnify_pieces(
     return DrawnPieces(window, MM_PER_M * places, cells, is_inside, captions)
 
 
-def _visible_factor(length: float, motion: np.ndarray) -> float:
+def _choose_visible_factor(length: float, motion: np.ndarray) -> float:
     """Return the factor 1, 2 or 5 times a power of ten that draws a motion [m] at most as a length [m]."""
     largest = np.abs(motion).max(initial=0.0)
     if largest == 0:
@@ -188,7 +188,7 @@ def draw_pieces(
     from matplotlib.figure import Figure
 
     low, high = frames.blocks["lower"].points.min(axis=0), frames.blocks["upper"].points.max(axis=0)
-    windows = ((low[0], high[0], low[1], high[1]), contact_window(frames))
+    windows = ((low[0], high[0], low[1], high[1]), find_contact_window(frames))
     figure = Figure(figsize=FIGURE_SIZE_INCHES, dpi=PIXELS_PER_INCH, layout="constrained")
     panels = figure.subplots(1, 2) if onto is None else [onto]
 
@@ -323,7 +323,7 @@ def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> 
     """
     from matplotlib import animation, rcParams
 
-    numbers = last_frames(frames.times)
+    numbers = select_last_frames(frames.times)
     if len(numbers) < 2 and out.suffix != ".html":
         raise PatchfemError(
             f"{frames.path}: contains only one frame, so there is no motion to show; write a "

@@ -136,7 +136,7 @@ def format_quantity(name: str, quantity: Quantity) -> str:
         texts = round_to_error(
             value * scale,
             None if error is None else error * scale,
-            _zero_limit(name, quantity) * scale,
+            _find_zero_limit(name, quantity) * scale,
         )
         return format_with_error(*texts, unit)
     return _format_interval(value * scale, quantity, unit, scale)
@@ -192,7 +192,7 @@ def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) 
     return f"{text} {unit} ({low} to {high})".replace("  ", " ")
 
 
-def _zero_limit(name: str, quantity: Quantity) -> float:
+def _find_zero_limit(name: str, quantity: Quantity) -> float:
     """Return the magnitude [SI] below which a quantity is displayed as 0.
 
     It is the floor of its definition where that is smaller than the floor of the run, which a run raises to its tolerance.

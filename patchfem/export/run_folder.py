@@ -16,7 +16,7 @@ from . import page, store
 from .answer import Answer
 from .fields import vtkhdf
 from .folder import WEAR_STATE_FILE, Folder, list_states
-from .runs import make_answer
+from .runs import make_run_answer
 
 MAX_WRITTEN_INTERFACES = 6  # fields of further interfaces are not written
 INTERFACES_FOLDER = "interfaces"
@@ -82,7 +82,7 @@ def run_into(
         try:
             result = run(run_plan, report, progress, fresh=fresh, state_file=state_file)
         except NotConverged as error:
-            result = _partial_result(error)
+            result = _extract_partial_result(error)
         answer = write_results(result, folder.path)
         fault = draw_page(folder.path) if has_page else None
     return WrittenRun(answer, result, fault)
@@ -100,7 +100,7 @@ def draw_page(folder: Path) -> BaseException | None:
     return None
 
 
-def _partial_result(error: NotConverged) -> Result:
+def _extract_partial_result(error: NotConverged) -> Result:
     """Return what a run that did not converge has computed, with the reason as a warning.
 
     NotConverged is raised again if it has computed nothing.
@@ -167,7 +167,7 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
         face_notes = _write_face(result, face, folder / INTERFACES_FOLDER / face.folder)
         notes += [f"interface {face.name}: {note}" for note in face_notes]
     result.seconds["files"] = process_time() - start_time
-    answer = make_answer(result)
+    answer = make_run_answer(result)
     if case is not None:
         answer = replace(answer, details=answer.details | {"case": case})
     store.write_answer(answer, folder)

@@ -24,7 +24,7 @@ MIN_STIFFNESS_TO_ERROR = 10.0
 RECORDED_PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
-def make_answer(result: Result) -> Answer:
+def make_run_answer(result: Result) -> Answer:
     """Return the answer of a run: its measures, verdict, arrays and warnings, from its result."""
     run_plan = result.plan
     source = run_plan.model.source
@@ -108,7 +108,7 @@ def make_command(verb: str, path: Path, sets: tuple[str, ...], options: Sequence
     words = ["patchfem", verb, name]
     for assignment in sets:
         key, _, value = assignment.partition("=")
-        words += ["--set", f"{key}={Path(value).name if value.startswith('/') else value}"]
+        words += ["--set", f"{key}={Path(value).name if Path(value).is_absolute() else value}"]
     return shlex.join([*words, *options])
 
 

@@ -18,7 +18,6 @@ N_NODES = 48  # nodes of Gauss's rule over a branch of a loop, which is exact wh
 N_AMPLITUDES = 200  # amplitudes of the table of a law, evenly in the logarithm
 MIN_AMPLITUDE_RATIO = 1e-2  # smallest amplitude of this table, relative to the stretch before slip
 N_SUBSTITUTIONS = 60  # substitutions of the stiffness, each by half of its change
-N_FIRST_CYCLES = 3  # cycles of a motion that starts from the balance before its first correction
 # Height of a maximum of the first-harmonic balance that is examined, relative to the highest steady motion. For the damper
 # of the template the balance exceeds it by up to 70 %, and falls short of it by 7 %.
 MIN_HEIGHT_RATIO = 0.5
@@ -28,7 +27,7 @@ MAX_CHANGE = 1e-3  # relative change of all stiffnesses at which the substitutio
 class BalancedMotions(NamedTuple):
     """First harmonics of the motions of a rig at k frequencies, as complex amplitudes.
 
-    - omega: (k,) circular frequencies [rad/s]
+    - omega: (k,) increasing circular frequencies [rad/s]
     - modes: (k, n) modal coordinates [m]
     - slides: (k, i) relative displacements of the interfaces [m]
     """
@@ -37,16 +36,21 @@ class BalancedMotions(NamedTuple):
     modes: np.ndarray
     slides: np.ndarray
 
-    def make_start(self, case: Case, number: int) -> State:
-        """Return the state at the start of a period of the motion of a given number, for a case at its frequency.
+    def make_start(self, case: Case) -> State:
+        """Return the state at the start of a period of a case, interpolated to its frequency.
 
         The laws remember the loop between both reversals of the slide.
         """
         state = make_arrays(case)[0]
         n = self.modes.shape[1]
-        state.y[:n] = self.modes[number].imag
-        state.y[n : 2 * n] = case.rig.settings[Setting.OMEGA] * self.modes[number].real
-        for face, memory, slide in zip(case.rig.faces, state.memory, self.slides[number]):
+        omega = case.rig.settings[Setting.OMEGA]
+        modes, slides = (
+            np.array([np.interp(omega, self.omega, column) for column in table.T])
+            for table in (self.modes, self.slides)
+        )
+        state.y[:n] = modes.imag
+        state.y[n : 2 * n] = omega * modes.real
+        for face, memory, slide in zip(case.rig.faces, state.memory, slides):
             memory[Memory.COUNT] = 0
             memory[Memory.DIRECTION] = 1.0 if slide.real >= 0 else -1.0
             ends = (-abs(slide), abs(slide))

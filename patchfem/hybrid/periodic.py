@@ -70,7 +70,6 @@ MAX_BROYDEN_RATIO = 0.3
 MAX_DETOURS = (
     3  # largest number of shortened Newton steps, and of Newton steps with new derivatives
 )
-NOT_FOLLOWED_MESSAGE = "no periodic motion was found near a similar one"
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
 
@@ -115,7 +114,6 @@ def find_periodic_motion(
     start: State | None = None,
     has_kinks: bool = False,
     is_undamped: bool = False,
-    odd_laws: Sequence[LawNumbers] = (),
 ) -> PeriodicMotion:
     """Find the periodic motion that follows some first cycles of a case.
 
@@ -133,8 +131,6 @@ def find_periodic_motion(
     is_undamped : bool
         Whether a free motion without friction does not decay. A motion from rest that grows for ever is then found first,
         because the periods of a growing motion would lead nowhere.
-    odd_laws : sequence of LawNumbers
-        Laws of a rig whose motions are symmetric, see `Shooting`.
 
     Raises
     ------
@@ -142,7 +138,7 @@ def find_periodic_motion(
         If the search needs too many steps.
     """
     growth = _measure_growth(case) if is_undamped and start is None else None
-    shooting = Shooting(case, odd_laws)
+    shooting = Shooting(case)
     if start is not None:
         shooting.state = start
     if growth is None or not growth.size:
@@ -191,6 +187,8 @@ def _search(
     if has_kinks:
         tolerance = max(tolerance, MAX_KINKED_CHANGE)
     before, change = shooting.converge(tolerance, max_relaxed)
+    if not shooting.has_exact_map:
+        shooting.map = None
     if has_kinks:
         multipliers, error = shooting.check(before, tolerance)
     else:
@@ -221,19 +219,19 @@ def _search(
 
 
 def follow_periodic_motion(
-    case: Case, near: PeriodicMotion, odd_laws: Sequence[LawNumbers] = ()
+    case: Case, near: PeriodicMotion | State, odd_laws: Sequence[LawNumbers] = ()
 ) -> PeriodicMotion:
     """Find the periodic motion of a case from that of a similar case, without its stability and the error of its state.
 
     The derivatives of the similar motion serve as long as the corrections with them converge, so that the motion after a
-    small change of the case takes four periods. A fit computes its motions in this way.
+    small change takes four periods.
 
     Parameters
     ----------
     case : Case
         Its start and schedule are not used.
-    near : PeriodicMotion
-        Motion of a similar case, in which no motion grows for ever.
+    near : PeriodicMotion or State
+        Similar motion that does not grow, or a state near the start of the motion.
     odd_laws : sequence of LawNumbers
         Laws of a rig whose motions are symmetric, see `Shooting`.
 
@@ -242,21 +240,15 @@ def follow_periodic_motion(
     PeriodicMotion
         A change of MAX_KINKED_CHANGE over its period counts as none, because an interface that hardly slips comes to rest
         only after hundreds of periods.
-
-    Raises
-    ------
-    NotConverged
-        If the similar motion is too far away.
     """
     shooting = Shooting(case, odd_laws)
-    shooting.state = near.run.final
-    shooting.map = near.map
+    if isinstance(near, PeriodicMotion):
+        shooting.map = near.map
+        near = near.run.final
+    shooting.state = near
     shooting.relax(1)
-    found = shooting.find_fixed_point(MAX_CHANGE * float(case.rig.settings[Setting.RTOL]))
-    if found is None:
-        raise NotConverged(NOT_FOLLOWED_MESSAGE)
-    before = found[0]
-    change = shooting.measure_change(before)
+    tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
+    before, change = shooting.converge(tolerance, N_RELAXED, MAX_KINKED_CHANGE)
 
     # One more correction, after which the measured period begins nearer to the periodic motion
     if shooting.map is not None:
@@ -329,6 +321,10 @@ class Shooting:
         if not self.measures_periods:
             self.record.cycles[:, Cycle.WINDOW] = -1.0
         self.blank = Record(*(array.copy() for array in self.record))
+        self.run = compiled.load_compiled_module("hybrid.engine_kernels").run_case
+        # Signs of all entries of the state of the opposite motion
+        self.signs = State(*(np.ones_like(array) for array in self.state))
+        mirror_state(self.signs, case.rig.modes.shape[1], odd_laws)
         self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
         self.n_periods = 0
         self.n_steps = 0.0
@@ -365,9 +361,7 @@ class Shooting:
         state.clock[:] = 0.0
         state.clock[Clock.STEP] = 0.1 * settings[Setting.LONGEST_STEP]
         state.clock[Clock.N_STEPS] = self.n_steps
-        compiled.load_compiled_module("hybrid.engine_kernels").run_case(
-            self.case.rig, state, self.record
-        )
+        self.run(self.case.rig, state, self.record)
         self.n_periods += 1
         self.n_steps = state.clock[Clock.N_STEPS]
         if self.n_steps > settings[Setting.MAX_STEPS]:
@@ -376,7 +370,8 @@ class Shooting:
                 f'no periodic motion was found: {cause}, or accuracy.method = "auto"'
             )
         if self.odd_laws:
-            mirror_state(state, self.case.rig.modes.shape[1], self.odd_laws)
+            state.y[:] *= self.signs.y
+            state.memory[:] *= self.signs.memory
         return copy_state(state)
 
     def relax(self, count: int) -> None:
@@ -384,7 +379,9 @@ class Shooting:
         for _ in range(count):
             self.state = self.advance(self.state)
 
-    def converge(self, tolerance: float, max_relaxed: int) -> tuple[State, float]:
+    def converge(
+        self, tolerance: float, max_relaxed: int, kinked: float = 0.0
+    ) -> tuple[State, float]:
         """Correct the state until a period changes it by less than a tolerance and keeps the regimes of the laws.
 
         Periods of the motion itself follow a search that has failed, twice as many after the next one. They are many for an
@@ -396,6 +393,8 @@ class Shooting:
             Largest change over a period, relative to the motion.
         max_relaxed : int
             Largest number of these periods in a row.
+        kinked : float
+            As in `find_fixed_point`.
 
         Returns
         -------
@@ -407,10 +406,8 @@ class Shooting:
         n_relaxed = N_RELAXED
         for _ in range(MAX_SEARCHES):
             state = self.state
-            found = self.find_fixed_point(tolerance, kinked=0.0)
+            found = self.find_fixed_point(tolerance, kinked)
             if found is not None:
-                if not self.has_exact_map:
-                    self.map = None
                 return found[0], self.measure_change(found[0])
             self.state = state
             self.map = None
@@ -485,10 +482,10 @@ class Shooting:
             best = change
             last_residual = residual
             self.has_exact_map = self.map is None
-            if not np.isfinite(self.differentiate(before)[0].slopes).all():
-                return None
             advanced = self.state
             self.correct(before)
+            if self.state is advanced:
+                return None
             if not self.is_possible():
                 self.state = advanced
                 self.map = None
@@ -563,7 +560,7 @@ class Shooting:
 
     def pack(self, state: State) -> np.ndarray:
         """Return the n states of the motion and the reversal points in one array (k,)."""
-        return np.append(state.y[: self.n], state.memory[:, Memory.STACK :])
+        return np.concatenate([state.y[: self.n], state.memory[:, Memory.STACK :].ravel()])
 
     def unpack(self, state: State, packed) -> State:
         """Return a copy of a state with the values of `pack`."""
@@ -636,17 +633,17 @@ class Shooting:
             return np.full(change.size, np.nan), np.inf
         # A state that nothing determines, such as that of an interface at rest, has no error.
         step = _solve_newton(found, change, NEUTRAL_TOL)
-        multipliers = np.linalg.eigvals(found.slopes)
-        if self.odd_laws:
-            multipliers = multipliers**2
-        return multipliers, float(np.abs(step).max(initial=0.0))
+        return np.linalg.eigvals(found.slopes), float(np.abs(step).max(initial=0.0))
 
     def correct(self, before: State) -> None:
         """Replace the state by a Newton step from another one, which a period takes to it.
 
-        Regimes are those at the end of the period, where the motion has brought them.
+        Regimes are those at the end of the period, where the motion has brought them. Without finite derivatives the state
+        remains.
         """
         period_map, change = self.differentiate(before)
+        if not np.isfinite(period_map.slopes).all():
+            return
         packed = self.pack(self.state)
         step = _solve_newton(period_map, change, SINGULAR_TOL) * period_map.scale
         packed[period_map.columns] = self.pack(before)[period_map.columns] + step
@@ -689,4 +686,4 @@ def _solve_newton(linear: PeriodMap, change, rcond: float) -> np.ndarray:
 
 def copy_state(state: State) -> State:
     """Return an independent copy of a state."""
-    return State(*(array.copy() for array in state))
+    return State._make([array.copy() for array in state])

@@ -9,10 +9,16 @@ functions that evaluate samples.
 # Names that tests and scripts import from the folder, by module.
 PUBLIC = {
     "decay_curve": ("DecayCurve", "fit_decay_curve", "locate_reversals", "make_half_cycles"),
-    "errors": ("ERROR_MEASURES", "convergence_errors"),
+    "errors": ("ERROR_MEASURES", "estimate_convergence_errors"),
     "events": ("EVENT_KIND_NAMES", "Level", "bracket_onset", "make_onset_test"),
     "measures": ("compute_step_harmonic",),
     "reasons": ("STICKS_AT_REVERSAL_REASON", "find_invalid"),
-    "rows": ("AMPLITUDE", "INTERNAL_VALUES", "MOTION_TABLE", "error_floor", "set_final_floors"),
+    "rows": (
+        "AMPLITUDE",
+        "INTERNAL_VALUES",
+        "MOTION_TABLE",
+        "find_error_floor",
+        "set_final_floors",
+    ),
     "spectrum": ("read_instrument",),
 }

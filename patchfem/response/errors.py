@@ -27,11 +27,11 @@ from .measures import Measures, Values
 from .rows import (
     SLIP_START_PHASE,
     STICK_FRACTION,
-    error_floor,
     find_definition,
-    larger_term,
+    find_error_floor,
+    find_larger_term,
+    find_subtracted_terms,
     select_names,
-    subtracted_terms,
 )
 
 LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
@@ -46,7 +46,7 @@ PHASE_MEASURES = select_names("phase")  # Angles modulo pi.
 DIFFERENCE_ROUND_OFF = 1e-13
 
 
-def signed_change(fine: Values, coarse: Values) -> Values:
+def compute_signed_changes(fine: Values, coarse: Values) -> Values:
     """Return the difference of each measure, fine minus coarse; that of phases is reduced modulo pi."""
     changes = {name: fine[name] - coarse[name] for name in fine if name in coarse}
     for name in PHASE_MEASURES:
@@ -55,12 +55,14 @@ def signed_change(fine: Values, coarse: Values) -> Values:
     return changes
 
 
-def absolute_change(fine: Values, coarse: Values) -> Values:
+def compute_absolute_changes(fine: Values, coarse: Values) -> Values:
     """Return the absolute difference of each measure between two runs; phases are modulo pi."""
-    return {name: abs(difference) for name, difference in signed_change(fine, coarse).items()}
+    return {
+        name: abs(difference) for name, difference in compute_signed_changes(fine, coarse).items()
+    }
 
 
-def convergence_errors(
+def estimate_convergence_errors(
     *values: Values,
     ratio: float = 2.0,
     order: float = MIN_CONVERGENCE_ORDER,
@@ -85,7 +87,7 @@ def convergence_errors(
     dict
         Errors by name, for the measures of the two finest runs.
     """
-    changes = [signed_change(*pair) for pair in pairwise(values)]
+    changes = [compute_signed_changes(*pair) for pair in pairwise(values)]
     errors = {}
     for name in changes[0]:
         known = [change[name] for change in changes if name in change]
@@ -102,7 +104,7 @@ def convergence_errors(
     return errors
 
 
-def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
+def estimate_errors_from_finer(values: Values, finer: Values, *coarser: Values) -> Values:
     """Estimate the error of each measure from a run with more modes or bond strips.
 
     The finer run has twice as many of them, and the coarser run half as many. Where the change to the
@@ -121,9 +123,11 @@ def finer_errors(values: Values, finer: Values, *coarser: Values) -> Values:
     dict
         Errors by name.
     """
-    errors = convergence_errors(values, finer, ratio=0.5, order=MAX_CONVERGENCE_ORDER)
+    errors = estimate_convergence_errors(values, finer, ratio=0.5, order=MAX_CONVERGENCE_ORDER)
     for run in coarser:
-        for name, error in convergence_errors(values, run, order=MAX_CONVERGENCE_ORDER).items():
+        for name, error in estimate_convergence_errors(
+            values, run, order=MAX_CONVERGENCE_ORDER
+        ).items():
             if name in errors:
                 errors[name] = np.maximum(errors[name], error / 2.0**MAX_CONVERGENCE_ORDER)
     return errors
@@ -159,7 +163,7 @@ class FrictionScale(NamedTuple):
     cycle_work: float
 
 
-def friction_errors(values: Values, fraction: float, law, load: float, works) -> Values:
+def compute_friction_errors(values: Values, fraction: float, law, load: float, works) -> Values:
     """Return the errors of the measures caused by a relative error of the friction force.
 
     The error of a measure is `fraction` times a reference value: the friction limit, the bond
@@ -210,8 +214,8 @@ def add_errors(
     measures = {}
     for name, parts in split_errors(values, errors).items():
         value = float(values[name])
-        error = total_error(name, values, parts.values(), min_relative_error)
-        floor = float(error_floor(name, values, size))
+        error = combine_errors(name, values, parts.values(), min_relative_error)
+        floor = float(find_error_floor(name, values, size))
         measures[name] = Measure(
             value, find_definition(name).unit, float(error), floor, parts=parts
         )
@@ -268,7 +272,7 @@ def add_run_error_estimates(measures: Measures, error_estimates: Values) -> Meas
     return updated
 
 
-def total_error(name: str, values: Values, parts, min_relative_error):
+def combine_errors(name: str, values: Values, parts, min_relative_error):
     """Return the total error of a measure, of one run or of n runs.
 
     The round-off of a small difference of large terms is added: of a friction force whose first harmonic lags the slide by
@@ -291,17 +295,17 @@ def total_error(name: str, values: Values, parts, min_relative_error):
         return np.minimum(error, np.pi / 2)
     if name in ERROR_MEASURES:  # The value of such a measure is itself an error.
         return np.maximum(error, np.abs(value))
-    error = error + DIFFERENCE_ROUND_OFF * larger_term(name, values)
-    return error + np.maximum(DIFFERENCE_ROUND_OFF, min_relative_error) * subtracted_terms(
+    error = error + DIFFERENCE_ROUND_OFF * find_larger_term(name, values)
+    return error + np.maximum(DIFFERENCE_ROUND_OFF, min_relative_error) * find_subtracted_terms(
         name, values
     )
 
 
 # Rule of CoarserRuns for a coarser mesh or fewer shear modes.
-second_order_errors = partial(convergence_errors, order=MAX_CONVERGENCE_ORDER)
+second_order_errors = partial(estimate_convergence_errors, order=MAX_CONVERGENCE_ORDER)
 # Rule of CoarserRuns for a coarser mesh under points that pass an edge of contact. The place of the edge between the points
 # has an error of a part of their distance that varies irregularly from mesh to mesh; a higher order shows by chance.
-edge_errors = partial(convergence_errors, max_order=MIN_CONVERGENCE_ORDER)
+edge_errors = partial(estimate_convergence_errors, max_order=MIN_CONVERGENCE_ORDER)
 
 
 class CoarserRuns(NamedTuple):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..formatting import format_length
-from .measures import Values, slip_round_off
+from .measures import Values, estimate_slip_round_off
 from .rows import AMPLITUDE, select_names
 
 # Kinds of events, as indices of EVENT_KIND_NAMES.
@@ -94,7 +94,9 @@ def is_all_stuck(window, max_stick_slip: float) -> bool:
     The limit applies to half the range of the slip, and is at least its round-off.
     """
     slips = np.column_stack([window.slip, window.slips])
-    return bool(np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, slip_round_off(window)))
+    return bool(
+        np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, estimate_slip_round_off(window))
+    )
 
 
 # Smallest relative change between two samples from which the amplitude of a mode is computed.

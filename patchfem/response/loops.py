@@ -34,7 +34,7 @@ class Reversal(NamedTuple):
     force: float | None
 
 
-def cycle_spans(time, period: float) -> list[tuple[float, float]]:
+def find_cycle_spans(time, period: float) -> list[tuple[float, float]]:
     """Return the start and end times [s] of the complete cycles in a window, oldest first.
 
     Cycles are counted from the end, so that an incomplete cycle at the start is omitted.
@@ -44,7 +44,7 @@ def cycle_spans(time, period: float) -> list[tuple[float, float]]:
     return list(pairwise(ends))
 
 
-def reversal_force_rule(model) -> str:
+def choose_reversal_force_rule(model) -> str:
     """Return by which rule `find_reversals` takes the friction force at a reversal: "jumps", "rate" or "slide".
 
     The force of the law jumps there, changes with time also at rest, or depends on the relative displacement alone.
@@ -81,7 +81,7 @@ def find_reversals(
     """
     reversals = []
     time_tolerance = SAME_EVENT_TIME_TOL * period
-    for begin, end in cycle_spans(time, period):
+    for begin, end in find_cycle_spans(time, period):
         cycle = slice(*np.searchsorted(time, [begin - time_tolerance, end + time_tolerance]))
         pair = []
         # The smallest displacement is the largest one of the motion -q(t).
@@ -96,7 +96,9 @@ def find_reversals(
                 )
             force_there = None
             if sample is not None:
-                force_there = _force_at_reversal(sign * slide, force, sample, fraction, value, rule)
+                force_there = _find_force_at_reversal(
+                    sign * slide, force, sample, fraction, value, rule
+                )
             pair.append(Reversal(sign * value, force_there))
         reversals.append(tuple(pair))
     return reversals
@@ -143,7 +145,7 @@ def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, flo
     return None, 0.0
 
 
-def _force_at_reversal(
+def _find_force_at_reversal(
     slide, force, sample: int, fraction: float, value: float, rule: str
 ) -> float | None:
     """Return the friction force [N] at the largest relative displacement, or None if it is unknown.
@@ -157,14 +159,14 @@ def _force_at_reversal(
         )
     peak = sample + int(fraction > 0 and slide[sample + 1] > slide[sample])
     if rule == "jumps":
-        return _force_around_rest(slide, force, peak, value)
+        return _find_force_around_rest(slide, force, peak, value)
     rise = slide[peak] - slide[sample - 1] if fraction > 0 and sample > 0 else 0.0
     if rise <= 0:
         return float(force[peak])
     return float(force[peak] + (force[peak] - force[sample - 1]) * (value - slide[peak]) / rise)
 
 
-def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
+def _find_force_around_rest(slide, force, sample: int, value: float) -> float | None:
     """Return the mean of the friction forces [N] before and after a rest at a reversal.
 
     Parameters
@@ -193,14 +195,14 @@ def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
     return float(force[before[-1]] + force[sample + after[0] + 1]) / 2
 
 
-def mean_half_range(reversals) -> float:
+def compute_mean_half_range(reversals) -> float:
     """Return half the range of the relative displacement [m], averaged over the cycles."""
     if not reversals:
         return 0.0
     return float(np.mean([high.slide - low.slide for low, high in reversals])) / 2
 
 
-def secant_stiffness(reversals) -> float | None:
+def compute_secant_stiffness(reversals) -> float | None:
     """Return the secant stiffness (F(q_max) - F(q_min))/2A [N/m], averaged over the cycles.
 
     The result is None if the interface is at rest in all cycles, or if no cycle has both forces.
@@ -246,7 +248,7 @@ def sample_loop(time, slide, force, omega: float, work: float) -> CycleLoop:
     return CycleLoop(compute_harmonic(time, weight, moved, omega), force, work)
 
 
-def interface_loop(
+def compute_interface_loop(
     amplitude: float, q: complex, f: complex, work: float, stiffness: float
 ) -> Values:
     """Return loop area, equivalent stiffness and equivalent damping of an interface as a dict.
@@ -275,7 +277,7 @@ def interface_loop(
     return {name: float(value) for name, value in values.items() if not np.isnan(value)}
 
 
-def mean_drift(time, slide, rate, period: float) -> float:
+def compute_mean_drift(time, slide, rate, period: float) -> float:
     """Return the change of the mean position per cycle (drift) [m].
 
     The drift is the difference between the time means of the last and the first cycle, divided by the number

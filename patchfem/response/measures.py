@@ -30,7 +30,7 @@ MAX_SMOOTH_CURVATURE_RATIO = 4.0
 PLATEAU_TOL = 1e-12  # Difference of samples that count as equal, relative to the range of all.
 
 
-def relative_gap(sampled_work, balance_work, exchanged_work, energy=0.0):
+def compare_friction_works(sampled_work, balance_work, exchanged_work, energy=0.0):
     """Return the relative difference between sampled friction work and that in the balance.
 
     Parameters
@@ -117,7 +117,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     slip = window.slip
     amplitude = interpolate_range(slip)[0] / 2
     # A single sample, or a slip within round-off, counts as stick.
-    if slip.size < 2 or 2 * amplitude <= slip_round_off(window):
+    if slip.size < 2 or 2 * amplitude <= estimate_slip_round_off(window):
         return {"slip_amplitude": amplitude, "stick_fraction": 1.0}
 
     # Excess of the ratio slip/displacement of each step. A step at rest counts as a step without slip.
@@ -146,16 +146,16 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     if onsets.size:
         rise = (after - before)[onsets]
         onset_times = middles[onsets] - before[onsets] / rise * np.diff(middles)[onsets]
-        measures |= slip_start_measure(2 * np.pi / drive.period * onset_times)
+        measures |= average_slip_starts(2 * np.pi / drive.period * onset_times)
     return measures
 
 
-def slip_round_off(window: Response) -> float:
+def estimate_slip_round_off(window: Response) -> float:
     """Return the slip [m] in the window of a run that may be round-off of the modal coordinates."""
     return MODAL_COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
 
 
-def slip_start_measure(phases) -> Values:
+def average_slip_starts(phases) -> Values:
     """Return the mean of the drive phases (k,) [rad] at which slip starts, by the name of this measure.
 
     The dict is empty if the phases differ.
@@ -176,7 +176,7 @@ def compute_ledger_measures(ledger) -> Values:
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 
 
-def work_difference(work, loops, jumps: bool = False) -> float:
+def compare_loop_work(work, loops, jumps: bool = False) -> float:
     """Return the relative difference [1] between the friction work of the engine and int F dx over the samples.
 
     |sum of int F dx over all directions by the trapezoidal rule - work| / (sum over all steps of |change of work|). It
@@ -200,7 +200,7 @@ def work_difference(work, loops, jumps: bool = False) -> float:
             np.divide(works, steps, out=np.zeros_like(steps), where=steps != 0) if jumps else None
         )
         total += float(friction.path_work.sampled_work(slide, force, after).sum())
-    return relative_gap(total, float(work[-1]), float(np.abs(works).sum()))
+    return compare_friction_works(total, float(work[-1]), float(np.abs(works).sum()))
 
 
 def compute_peak(values) -> float:
@@ -275,7 +275,7 @@ def interpolate_range(values) -> tuple[float, float]:
     return float(rise + fall - (high - low)), rise_error + fall_error
 
 
-def peak_sampling_errors(window: Response) -> Values:
+def bound_sampling_errors(window: Response) -> Values:
     """Return bounds on the errors of peaks and ranges due to sampling, by measure.
 
     Runs with fewer steps may not show these errors, because they contain some of the same instants.

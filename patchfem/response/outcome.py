@@ -17,10 +17,10 @@ from .rows import AMPLITUDE, STEADY_AMPLITUDE
 from .settling import (
     MOTION_CLASSES,
     classify_motions,
+    estimate_ringing,
     join_cycles,
     judge_motions,
     measure_windows,
-    remaining_ringing,
     select_reported,
 )
 
@@ -243,7 +243,7 @@ def find_ringing(solution, measures: Measures, limits: tuple[float, float], driv
         return 0.0
     window = structure.drive_sizes.count_cycles(solution.window.time, drive)
     decay = min_decay_rate * drive.period * window
-    ringing = float(remaining_ringing(measure_windows(solution.extremes, window), decay))
+    ringing = float(estimate_ringing(measure_windows(solution.extremes, window), decay))
     sizes = (amplitude.value, amplitude.error or 0.0, amplitude.floor)
     return ringing if is_ringing_visible(ringing, *sizes, tolerance) else 0.0
 

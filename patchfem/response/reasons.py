@@ -70,7 +70,7 @@ def find_missing(
     """
     reasons = {}
     for name in PERIODIC_MEASURES if has_loaded_interface else ACCELERATION_MEASURES:
-        reasons[name] = _reason_for_missing_cycle_value(
+        reasons[name] = _explain_missing_cycle_value(
             name, values, window, drive, other_modes_fraction
         )
     if hasattr(drive, "band"):
@@ -79,7 +79,7 @@ def find_missing(
             "the frequency response (H1) has no peak within the frequency band of the drive",
         )
     if has_loaded_interface:
-        reasons["slip_start_phase"] = _reason_for_missing_phase(values, drive)
+        reasons["slip_start_phase"] = _explain_missing_phase(values, drive)
     return {
         name: _make_missing_measure(name, reason)
         for name, reason in reasons.items()
@@ -174,7 +174,7 @@ def find_missing_unbounded(values) -> Measures:
     return out
 
 
-def _reason_for_missing_phase(values, drive) -> str:
+def _explain_missing_phase(values, drive) -> str:
     """Return the reason why the phase of slip onset has no value."""
     if not structure.drive_sizes.is_sinusoidal(drive):
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
@@ -186,7 +186,7 @@ def _reason_for_missing_phase(values, drive) -> str:
     return "the interface never sticks in the last cycles, so slip never starts after stick"
 
 
-def _reason_for_missing_cycle_value(
+def _explain_missing_cycle_value(
     name: str, values, window, drive, other_modes_fraction: float
 ) -> str:
     """Return the reason why a measure of the last cycles has no value.

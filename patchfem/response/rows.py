@@ -18,11 +18,11 @@ from ..motion_measures import MAX_RESTING_SLIDE_RANGE, energy_balance, ratio_or_
 from . import stationary
 from .loops import (
     Reversal,
+    compute_interface_loop,
+    compute_mean_drift,
+    compute_mean_half_range,
+    compute_secant_stiffness,
     find_reversals,
-    interface_loop,
-    mean_drift,
-    mean_half_range,
-    secant_stiffness,
 )
 from .measures import (
     Measures,
@@ -108,9 +108,11 @@ class LastCycles:
             2 * self.slide_round_off, MAX_RESTING_SLIDE_RANGE
         )
         if not is_moving:
-            return interface_loop(0.0, *self.loop, self.stiffness)
-        measures = interface_loop(mean_half_range(self.reversals), *self.loop, self.stiffness)
-        return measures | {"secant_stiffness": secant_stiffness(self.reversals)}
+            return compute_interface_loop(0.0, *self.loop, self.stiffness)
+        measures = compute_interface_loop(
+            compute_mean_half_range(self.reversals), *self.loop, self.stiffness
+        )
+        return measures | {"secant_stiffness": compute_secant_stiffness(self.reversals)}
 
     @cached_property
     def acceleration_measures(self) -> Values:
@@ -183,7 +185,7 @@ class LastCycles:
         return None if load is None or self.load is None else float(function(load))
 
 
-def _drift_scale(values: Values):
+def _find_drift_scale(values: Values):
     """Return the amplitude [m] with which the drift of an interface is compared.
 
     The scale is the slip amplitude, or without slip the amplitude of the motion.
@@ -197,7 +199,7 @@ def _drift_scale(values: Values):
     return np.where(slip > 0, slip, np.abs(values.get(AMPLITUDE, 0.0)))
 
 
-def _random_rows(
+def _make_random_rows(
     name: str, unit: str, floor: float, definition: str, group: str = "motion"
 ) -> tuple[MeasureDefinition, MeasureDefinition]:
     """Return the definitions of a measure under a random drive and of its statistical scatter.
@@ -310,8 +312,10 @@ MOTION_MEASURE_ROWS = (
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
         "first cycle of the window)/(number of cycles between these two cycles); null unless drive and load repeat in "
         "every cycle at the end of the run",
-        lambda s: mean_drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period),
-        larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
+        lambda s: compute_mean_drift(
+            s.window.time, s.window.slide, s.window.slide_rate, s.drive.period
+        ),
+        larger_term=("slip amplitude (without slip: amplitude of the motion)", _find_drift_scale),
         order=CUBIC_CONVERGENCE_ORDER,
         flags="displacement",
     ),
@@ -530,33 +534,33 @@ MOTION_MEASURE_ROWS = (
         flags="error",
         friction_scale=lambda _: 1.0,
     ),
-    *_random_rows(
+    *_make_random_rows(
         "relative_displacement_rms",
         "m",
         1e-10,
         "root mean square displacement at the output about its mean, under a random drive",
     ),
-    *_random_rows(
+    *_make_random_rows(
         "absolute_acceleration_rms",
         "m s-2",
         1e-4,
         "root mean square acceleration at the output, base motion included, under a random drive",
     ),
-    *_random_rows(
+    *_make_random_rows(
         "response_frequency",
         "Hz",
         1e-3,
         "frequency of the largest peak of the frequency response (H1 estimate) "
         "under a random drive",
     ),
-    *_random_rows(
+    *_make_random_rows(
         "response_damping",
         "1",
         1e-5,
         "damping ratio of the largest peak of the frequency response (H1 "
         "estimate), structure and friction together",
     ),
-    *_random_rows(
+    *_make_random_rows(
         "friction_power",
         "W",
         1e-9,
@@ -619,7 +623,7 @@ def compute_measures(last_cycles: LastCycles) -> Values:
     return {name: value for name, value in (values | known).items() if value is not None}
 
 
-def error_floor(name: str, values: Values, displacement=np.inf):
+def find_error_floor(name: str, values: Values, displacement=np.inf):
     """Return the floor of the error of a measure: the magnitude below which it is round-off, in the unit of the measure.
 
     The floor of a displacement is at most MAX_RELATIVE_FLOOR times that of the drive, and that of a friction force at most
@@ -647,7 +651,7 @@ def error_floor(name: str, values: Values, displacement=np.inf):
     )
 
 
-def larger_term(name: str, values: Values):
+def find_larger_term(name: str, values: Values):
     """Return the size of the terms if a measure is a difference, in the unit of the measure.
 
     Parameters
@@ -668,7 +672,7 @@ def larger_term(name: str, values: Values):
     return row.larger_term[1](_find_own_values(name, values))
 
 
-def subtracted_terms(name: str, values: Values):
+def find_subtracted_terms(name: str, values: Values):
     """Return the size of the terms whose round-off a difference has, in the unit of the measure; 0 of other measures.
 
     The drift is a difference of positions, and the secant stiffness one of friction forces over the range of the slide.
@@ -709,7 +713,7 @@ def set_final_floors(measures: Measures, tolerance: float) -> Measures:
     updated = {name: one for name, one in measures.items() if name not in INTERNAL_VALUES}
     for name in values.keys() & updated.keys():
         if remove_interface_number(name) in MOTION_TABLE:
-            floor = tolerance * float(larger_term(name, values))
+            floor = tolerance * float(find_larger_term(name, values))
             if floor > measures[name].floor:
                 updated[name] = replace(measures[name], floor=floor)
     return updated

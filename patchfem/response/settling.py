@@ -79,11 +79,11 @@ def judge_motions(extremes, phasors, window: int, tolerance, floor=0.0, decay=0.
     classes = classify_motions(amplitude, tolerance, floor)
     change = np.abs(np.where(np.isnan(steady[0]), last, steady[0]) - last)
     classes[(classes == STEADY_CLASS) & (change > allowed)] = 0
-    free_motion = remaining_free_motion(windows, decay)
+    free_motion = estimate_free_motion(windows, decay)
     classes[(classes != GROWS_CLASS) & (free_motion > allowed)] = 0
 
     # Without a visible transient, the steady amplitude is the mean over the cycles of the last window.
-    steady = np.where(np.isnan(steady), beat_mean_amplitudes(windows), steady)
+    steady = np.where(np.isnan(steady), average_beats(windows), steady)
     mean = windows.cycle_amplitude[:, -1]
     means = np.stack([mean, free_motion + np.abs(last - mean)])
     is_filled = np.isnan(steady) & (classes == STEADY_CLASS) & is_long
@@ -149,7 +149,7 @@ def classify_motions(amplitudes, tolerance: float, floor=0.0) -> np.ndarray:
     scale = tolerance * np.abs(amplitudes[:, -1]) + floor
     remainder = np.full(change.shape, np.nan)
     if amplitudes.shape[1] > 2:
-        remainder = np.abs(geometric_remainders(amplitudes[:, -3:]))
+        remainder = np.abs(sum_geometric_remainders(amplitudes[:, -3:]))
     has_limit = np.isfinite(remainder)
     is_increasing = _increases_steadily(amplitudes)
     is_growing = is_increasing & (change > 0.05 * scale)  # slower growth counts as steady
@@ -158,7 +158,7 @@ def classify_motions(amplitudes, tolerance: float, floor=0.0) -> np.ndarray:
     return classes
 
 
-def geometric_remainders(values):
+def sum_geometric_remainders(values):
     """Return what is left of geometric series through three successive values (..., 3), by Aitken's method.
 
     It is the difference between the limit of the series and the last value, or NaN if the series does not converge. A beat
@@ -178,7 +178,7 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> np.ndarray:
 
     In a linear rig, the remaining free motion is multiplied by a complex factor per window, and the phasors
     are extrapolated by Aitken's method. With friction, it follows a linear map of the plane, because
-    amplitude and phase decay differently (`plane_map_remainders`). The limit of the map is preferred, and
+    amplitude and phase decay differently (`sum_plane_map_remainders`). The limit of the map is preferred, and
     its distance from Aitken's limit is part of the error. The ratio of amplitude to |phasor| converges with
     the magnitude of the factor.
 
@@ -210,8 +210,8 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> np.ndarray:
     )
     waveform_change = (waveform[:, -1] - waveform[:, -2]) * decay_factor / (1 - decay_factor)
 
-    aitken_limits = _extrapolate_magnitudes(phasors, geometric_remainders, 3, 3)
-    map_limits = _extrapolate_magnitudes(phasors, plane_map_remainders, 4, 2)
+    aitken_limits = _extrapolate_magnitudes(phasors, sum_geometric_remainders, 3, 3)
+    map_limits = _extrapolate_magnitudes(phasors, sum_plane_map_remainders, 4, 2)
     has_map_limit = ~np.isnan(map_limits).any(axis=1)
     limit = np.where(has_map_limit, map_limits[:, 0], aitken_limits[:, 0])
     spread = np.where(
@@ -246,7 +246,7 @@ def _extrapolate_magnitudes(phasors, find_remainders, n_points: int, n_limits: i
     return np.abs(np.stack(limits, axis=1))
 
 
-def plane_map_remainders(p) -> np.ndarray:
+def sum_plane_map_remainders(p) -> np.ndarray:
     """Return the remaining sums (n,) of point sequences that follow a linear map of the plane.
 
     By the Cayley-Hamilton theorem, successive differences satisfy d3 = t d2 - q d1, with the trace t and the
@@ -344,7 +344,7 @@ def join_cycles(extremes, phasors, count: int) -> tuple[np.ndarray, np.ndarray]:
     return joined, phasors[first + count - 1 :: count]
 
 
-def remaining_free_motion(windows: Windows, decay=0.0):
+def estimate_free_motion(windows: Windows, decay=0.0):
     """Return the amplitude [m] of the decaying free motion that remains in the last window.
 
     A free motion near the drive frequency causes a beat. If the beat is shorter than a window, the amplitude
@@ -395,10 +395,10 @@ def remaining_free_motion(windows: Windows, decay=0.0):
     return (last_difference * ratio + np.where(persists, 0.0, excess[..., -1]))[()]
 
 
-def remaining_ringing(windows: Windows, decay):
+def estimate_ringing(windows: Windows, decay):
     """Return the part of the amplitude [m] that is free vibration while the interface sticks.
 
-    The result is `remaining_free_motion`, but at least the change of the amplitude in the last window.
+    The result is `estimate_free_motion`, but at least the change of the amplitude in the last window.
 
     Parameters
     ----------
@@ -408,10 +408,10 @@ def remaining_ringing(windows: Windows, decay):
         Logarithmic decay of the slowest mode over a window [1]. A negative one counts as 0.
     """
     change = np.abs(np.diff(windows.amplitude[..., -2:])).sum(axis=-1)
-    return np.maximum(remaining_free_motion(windows, np.maximum(decay, 0.0)), change)
+    return np.maximum(estimate_free_motion(windows, np.maximum(decay, 0.0)), change)
 
 
-def beat_mean_amplitudes(windows: Windows) -> np.ndarray:
+def average_beats(windows: Windows) -> np.ndarray:
     """Return the mean amplitudes [m] of motions with short beats, and their errors [m].
 
     The amplitude is the mean over the last third of the windows. The error is the sum of the largest
@@ -442,7 +442,7 @@ def beat_mean_amplitudes(windows: Windows) -> np.ndarray:
     return np.where(is_known, [value, error], np.nan)
 
 
-def slip_period(time, rate) -> float:
+def find_slip_period(time, rate) -> float:
     """Return the longest period [s] between the starts of the last slip intervals.
 
     The result is 0 if there are fewer than two slip intervals, or if the last one started more than 1.5

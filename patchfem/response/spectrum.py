@@ -18,7 +18,7 @@ STEP_GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Positions of the Gauss points in
 STEP_GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # Weights of the Gauss points in a step of length 1.
 
 
-def motion_harmonic(time, value, rate, omega: float) -> complex:
+def compute_motion_harmonic(time, value, rate, omega: float) -> complex:
     """Return the Fourier coefficient of the piecewise cubic motion through samples.
 
     With four Gauss points per step, the only error of the coefficient is that of the cubic: h^4/384 times
@@ -65,7 +65,7 @@ def differentiate_harmonic(harmonic, values, time, omega: float):
     return 2 / (time[-1] - time[0]) * change + 1j * omega * harmonic
 
 
-def acceleration_harmonic(time, value, rate, omega: float):
+def compute_acceleration_harmonic(time, value, rate, omega: float):
     """Return the Fourier coefficient [m s-2] of the acceleration from displacement and velocity.
 
     Parameters
@@ -77,11 +77,13 @@ def acceleration_harmonic(time, value, rate, omega: float):
     omega : float
         Angular frequency [rad/s].
     """
-    velocity = differentiate_harmonic(motion_harmonic(time, value, rate, omega), value, time, omega)
+    velocity = differentiate_harmonic(
+        compute_motion_harmonic(time, value, rate, omega), value, time, omega
+    )
     return differentiate_harmonic(velocity, rate, time, omega)
 
 
-def absolute_harmonic(window, drive, n: int) -> complex:
+def compute_absolute_harmonic(window, drive, n: int) -> complex:
     """Return the n-th harmonic [m s-2] of the absolute acceleration at the sensor.
 
     Parameters
@@ -96,7 +98,7 @@ def absolute_harmonic(window, drive, n: int) -> complex:
     segment = [part for part in drive.segments if part.start < window.time[-1]][-1]
     displacement = window.extra.get("sensor", window.output)
     rate = window.extra.get("sensor_rate", window.output_rate)
-    harmonic = acceleration_harmonic(window.time, displacement, rate, n * segment.omega)
+    harmonic = compute_acceleration_harmonic(window.time, displacement, rate, n * segment.omega)
     if n == 1 and drive.moving:
         # The acceleration a sin(omega (t - start) + phase) of the base is added.
         phase = segment.phase - segment.omega * segment.start
@@ -109,7 +111,7 @@ def find_acceleration_harmonics(window, drive) -> tuple[float, float]:
 
     `window` is a `Response` over complete cycles of a drive that ends as a sinusoid.
     """
-    first, third = (float(abs(absolute_harmonic(window, drive, n))) for n in (1, 3))
+    first, third = (float(abs(compute_absolute_harmonic(window, drive, n))) for n in (1, 3))
     return first, third
 
 
@@ -156,10 +158,10 @@ def read_instrument(
         span = window.time[-1] - window.time[0]
         return float(np.sqrt(np.trapezoid(window.acceleration**2, window.time) / span))
     if kind == "fundamental":
-        return abs(absolute_harmonic(window, drive, 1))
+        return abs(compute_absolute_harmonic(window, drive, 1))
     n = np.arange(1, N_FILTER_HARMONICS + 1)
     s = 1j * n * drive.omega / (2 * np.pi * cutoff)
-    filtered_harmonics = np.array([absolute_harmonic(window, drive, k) for k in n]) / (
+    filtered_harmonics = np.array([compute_absolute_harmonic(window, drive, k) for k in n]) / (
         1 + np.sqrt(2) * s + s**2
     )
     spectrum = np.zeros(N_FILTER_SAMPLES // 2 + 1, complex)

@@ -99,13 +99,13 @@ def random_response_measures(window, drive, *, has_friction: bool = False) -> Va
         ("absolute_acceleration_rms", window.acceleration, record.acceleration),
     ):
         measures[name] = compute_rms(window.time, values)
-        measures[f"{name}_scatter"] = rms_scatter(samples)
+        measures[f"{name}_scatter"] = estimate_rms_scatter(samples)
     fit = fit_peak(record, drive.band)
     if fit is not None:
         for name, value, scatter in zip(("response_frequency", "response_damping"), *fit):
             measures |= {name: value, f"{name}_scatter": scatter}
     if has_friction and "ledger" in window.extra:
-        measures["friction_power"], measures["friction_power_scatter"] = mean_power(
+        measures["friction_power"], measures["friction_power_scatter"] = compute_mean_power(
             window.time, window.extra["ledger"][0]
         )
     return {name: float(value) for name, value in measures.items() if np.isfinite(value)}
@@ -145,7 +145,7 @@ def compute_rms(time, values) -> float:
     return float(np.sqrt(np.trapezoid((values - mean) ** 2, time) / span))
 
 
-def rms_scatter(values) -> float:
+def estimate_rms_scatter(values) -> float:
     """Return the confidence half-width of the root mean square of equally spaced samples.
 
     The interval follows from the mean squares of N_RECORD_PARTS parts. It is computed for the logarithm of the
@@ -162,10 +162,10 @@ def rms_scatter(values) -> float:
     mean = square.mean()
     if not mean > 0:
         return 0.0
-    return float(np.sqrt(mean) * np.expm1(_confidence_half_width(parts) / mean / 2))
+    return float(np.sqrt(mean) * np.expm1(_find_confidence_half_width(parts) / mean / 2))
 
 
-def mean_power(time, work) -> tuple[float, float]:
+def compute_mean_power(time, work) -> tuple[float, float]:
     """Return the mean power [W] and its confidence half-width [W] from the cumulative work.
 
     The half-width comes from the means over N_RECORD_PARTS parts of equal length.
@@ -179,10 +179,10 @@ def mean_power(time, work) -> tuple[float, float]:
     """
     edges = np.linspace(time[0], time[-1], N_RECORD_PARTS + 1)
     parts = np.diff(np.interp(edges, time, work)) / np.diff(edges)
-    return parts.mean(), _confidence_half_width(parts)
+    return parts.mean(), _find_confidence_half_width(parts)
 
 
-def _confidence_half_width(parts) -> float:
+def _find_confidence_half_width(parts) -> float:
     """Return the half-width of the 95 % interval of the mean of N_RECORD_PARTS independent values, by Student's t."""
     return stdtrit(N_RECORD_PARTS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_RECORD_PARTS)
 
@@ -203,9 +203,10 @@ def is_stationary(window, drive) -> bool:
     half = displacement.size // 2
     first = displacement[:half]
     last = displacement[half:]
-    # `rms_scatter` returns about 2 standard errors, so that 4 standard errors are accepted.
+    # `estimate_rms_scatter` returns about 2 standard errors, so that 4 standard errors are accepted.
     return bool(
-        abs(first.std() - last.std()) <= 2 * np.hypot(rms_scatter(first), rms_scatter(last))
+        abs(first.std() - last.std())
+        <= 2 * np.hypot(estimate_rms_scatter(first), estimate_rms_scatter(last))
     )
 
 
@@ -334,7 +335,7 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
 
         The amplitude of the mode and a constant are those of least squares.
         """
-        response = expected_response(f, *np.exp(theta), span)
+        response = compute_expected_response(f, *np.exp(theta), span)
         basis, _ = np.linalg.qr(
             np.column_stack([np.concatenate([response.real, response.imag]), constants])
         )
@@ -345,7 +346,7 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
     return least_squares(compute_residual, theta, bounds=bounds, xtol=1e-10, ftol=1e-10).x
 
 
-def expected_response(f, omega: float, zeta: float, span: float) -> np.ndarray:
+def compute_expected_response(f, omega: float, zeta: float, span: float) -> np.ndarray:
     """Return the expected H1 estimate [s2] of a mode from Hann-windowed segments, in closed form.
 
     The result is int_0^span h(t) r(t) exp(-2 pi i f t) dt, where h is the impulse response of

@@ -479,7 +479,7 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
     present = settings[0].error
     distances = errors
     for run in coarser_runs:
-        change = response.errors.absolute_change(present_run.values, run.values)
+        change = response.errors.compute_absolute_changes(present_run.values, run.values)
         # A coarse run that is accurate by chance gets the error of the finer one.
         distances = {name: max(change[name] + errors[name], distances[name]) for name in measures}
         settings.insert(0, make_setting(run.steps, distances))

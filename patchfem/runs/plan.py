@@ -5,8 +5,9 @@ and for the patch of a joint that was bolted when the modes were measured. Read 
 the memory of the run (`list_memory_parts`), and refuses a run that needs more than is free or than the scene allows.
 """
 
-import os
+import mmap
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -434,29 +435,26 @@ def free_bytes(process: Path = Path("/proc"), group: Path = Path("/sys/fs/cgroup
         Folder of the outermost control group.
     """
     free = 1024 * _read_number(process / "meminfo", "MemAvailable:")
-    used = _read_number(process / "self/statm", place=1) * os.sysconf("SC_PAGE_SIZE")
+    used = _read_number(process / "self/statm", place=1) * mmap.PAGESIZE
     allowed = [_read_allowed(folder) for folder in _list_groups(process, group)]
     # An unknown number is not finite.
-    known = [total for total in (free, *allowed) if total < float("inf")]
-    return min(known, default=float("inf")) + (used if used < float("inf") else 0.0)
+    known = [total for total in (free, *allowed) if total < inf]
+    return min(known, default=inf) + (used if used < inf else 0.0)
 
 
 def _list_groups(process: Path, group: Path) -> list[Path]:
-    """Return the folders of the outermost control group and of those within it that contain the process.
+    """Return the folders of the control groups that contain the process, and those above them.
 
     The limit of each of them holds for all that it contains.
     """
-    try:
-        lines = (process / "self/cgroup").read_text("utf-8").splitlines()
-    except (OSError, ValueError):
-        lines = []
-    folders = [group]
-    for line in lines:
-        # A line of version 2 is 0::/PATH.
-        if line.startswith("0::/"):
-            for name in line.removeprefix("0::/").split("/"):
-                folders.append(folders[-1] / name)
-    return folders
+    folder = group
+    with suppress(OSError, ValueError):
+        for line in (process / "self/cgroup").read_text("utf-8").splitlines():
+            # A line of version 2 is 0::/PATH.
+            if line.startswith("0::/"):
+                folder = group / line.removeprefix("0::/")
+    # The folders above the outermost group have no limits.
+    return [folder, *folder.parents]
 
 
 def _read_allowed(group: Path) -> float:

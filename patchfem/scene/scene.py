@@ -25,7 +25,7 @@ from .rules.structure import describe_mode_defaults
 from .rules.support import check_combinations
 from .sets import format_assignments, require_units
 from .text import format_toml, list_named_effects
-from .toml_text import parse_text, read_text
+from .toml_text import name_file, parse_text, read_text
 
 __all__ = [
     "Scene",
@@ -108,7 +108,7 @@ class Scene:
             """Return the name of a file relative to the new folder; absolute names are kept."""
             if Path(name).is_absolute():
                 return name
-            return Path(os.path.relpath(self.resolve_path(name), start)).as_posix()
+            return name_file(self.resolve_path(name), start)
 
         return format_toml(rename_files(self.tables(), rename))
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 
 from ..disk.open_with_timeout import open_for_reading
@@ -27,6 +29,17 @@ _QUANTITY_OR_WORD_PATTERN = re.compile(
 )
 # Pattern of the position in an error message of tomllib
 _ERROR_POSITION_PATTERN = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+
+
+def name_file(path: Path, folder: str | Path) -> str:
+    """Return the name of the file `path` in a scene of a folder.
+
+    It is relative, with slashes; absolute for a file on another drive, to which Windows has no relative path.
+    """
+    path = os.path.abspath(path)
+    with suppress(ValueError):
+        path = os.path.relpath(path, folder)
+    return Path(path).as_posix()
 
 
 def read_text(path: str | Path) -> str:

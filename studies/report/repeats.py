@@ -128,7 +128,7 @@ def series(
             ),
             estimate=False,
         )
-        netcdf.write_netcdf(runs.make_answer(found), place / f"{number}.nc")
+        netcdf.write_netcdf(runs.make_run_answer(found), place / f"{number}.nc")
         start = [f"wear.start={number}.nc"]
         area = float(found.patch.pieces.interface.weight.sum())
         before, depth = (

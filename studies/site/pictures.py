@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 
 import patchfem as pf  # noqa: E402
 from patchfem.export.charts.axes import MATPLOTLIB_STYLE  # noqa: E402
-from patchfem.export.fields.film import contact_window, last_frames  # noqa: E402
+from patchfem.export.fields.film import find_contact_window, select_last_frames  # noqa: E402
 from patchfem.export.fields.vtkhdf import VTKHDF_FILE, Frames, read_frames  # noqa: E402
 from patchfem.export.pieces import draw_cells, magnify_pieces  # noqa: E402
 
@@ -95,7 +95,7 @@ def draw_loop(result) -> Figure:
 
 def read_stress(frames: Frames, name: str) -> np.ndarray:
     """Return a stress (f, c, ...) [MPa] of the cells of both pieces in the frames of the last cycle."""
-    numbers = last_frames(frames.times)
+    numbers = select_last_frames(frames.times)
     parts = [frames.blocks[side].cell_data[name][numbers] for side in ("lower", "upper")]
     return MPA * np.concatenate(parts, axis=1)
 
@@ -103,7 +103,7 @@ def read_stress(frames: Frames, name: str) -> np.ndarray:
 def draw_pieces(frames: Frames) -> Figure:
     """Draw normal and shear stress inside both pieces at the largest shear stress."""
     figure, axes = new_figure(5.2, 2, sharex=True)
-    drawn = magnify_pieces(frames, last_frames(frames.times), contact_window(frames))
+    drawn = magnify_pieces(frames, select_last_frames(frames.times), find_contact_window(frames))
     stress = read_stress(frames, "stress")
     index = int(np.argmax(np.abs(stress[..., 3]).max(axis=1)))
     stresses = {"normal stress −σyy": -stress[..., 1], "shear stress τxy": stress[..., 3]}
@@ -123,8 +123,8 @@ def draw_pieces(frames: Frames) -> Figure:
 def draw_film(frames: Frames) -> Figure:
     """Draw two frames of the film of a cycle: upper piece farthest to the left and to the right."""
     figure, axes = new_figure(5.2, 2, sharex=True)
-    numbers = last_frames(frames.times)
-    drawn = magnify_pieces(frames, numbers, contact_window(frames))
+    numbers = select_last_frames(frames.times)
+    drawn = magnify_pieces(frames, numbers, find_contact_window(frames))
     stress = read_stress(frames, "von_mises")
     top = np.quantile(stress[:, drawn.is_inside], 0.998)
     slides = frames.blocks["interface"].point_data["holder_slide"][numbers, 0]

@@ -74,7 +74,7 @@ def test_missing_stuck_frequency_has_its_reason(law, static, reason):
     scene = pf.load(make_shaken_block(law), **{"friction.static": static})
     model = pf.build(scene)
     backbone = compute_backbone(model, "", [1e-5], ("quasi-static",))
-    answer = backbones.make_answer(backbone, model.source)
+    answer = backbones.make_backbone_answer(backbone, model.source)
     assert answer.quantities["stuck_frequency"].value is None
     assert answer.quantities["stuck_frequency"].reason == reason
 
@@ -194,7 +194,7 @@ def test_refuses_scenes_without_a_rig():
         "balance": "balance cannot be computed on grooves",
         "quasi-static": "static curve cannot be computed on grooves",
     }
-    answer = backbones.make_answer(backbone, model.source)
+    answer = backbones.make_backbone_answer(backbone, model.source)
     for reason in backbone.missing.values():
         assert any(reason in note for note in answer.remarks.notes)
     assert format_curves(answer) == {}

@@ -41,7 +41,7 @@ cycles = 20
 def write_page(backbone, law: str, damping: float, folder) -> str:
     """Return the page of a backbone after writing its files into a folder."""
     source = make_rig(law, damping).source
-    store.write_answer(backbones.make_answer(backbone, source), folder)
+    store.write_answer(backbones.make_backbone_answer(backbone, source), folder)
     return page.write_report(folder).read_text("utf-8")
 
 
@@ -76,13 +76,15 @@ def test_amplitude_of_largest_damping_contains_the_peak_of_a_finer_grid():
     measures = []
     for amplitudes in (np.geomspace(1e-6, 1e-3, n) for n in (6, 31)):
         backbone = compute_backbone(model, "", amplitudes, ("balance",))
-        measures.append(backbones.make_answer(backbone, model.source).quantities)
+        measures.append(backbones.make_backbone_answer(backbone, model.source).quantities)
     coarse, fine = (one["amplitude_of_largest_damping"] for one in measures)
     assert coarse.value != fine.value and coarse.low < fine.low < fine.high < coarse.high
     assert 0 < measures[1]["exponent_gross"].error < 0.01
 
     falling = compute_backbone(model, "", np.geomspace(3e-4, 1e-3, 3), ("balance",))
-    end = backbones.make_answer(falling, model.source).quantities["amplitude_of_largest_damping"]
+    end = backbones.make_backbone_answer(falling, model.source).quantities[
+        "amplitude_of_largest_damping"
+    ]
     assert end.value == 3e-4 and end.low is None
 
 

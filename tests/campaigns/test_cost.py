@@ -17,7 +17,7 @@ from patchfem.campaigns import (
 )
 from patchfem.campaigns.convergence import find_order, find_sufficient_run, measure_convergence
 from patchfem.core import Measure
-from patchfem.export.costs import make_answer
+from patchfem.export.costs import make_cost_answer
 from patchfem.export.show import make_lines
 from patchfem.runs.run import run
 
@@ -93,7 +93,7 @@ def test_exact_screen_shows_main_measure_of_every_run():
     """The table on the screen has the main measure of each run, and says where its error is unknown."""
     runs = [make_cost("2", 1, 4e-2), make_cost("400", 12, 8e-3)]
     forget_errors(runs[1], "a")
-    lines = make_lines(make_answer({"knob": runs}, build_model(tolerance=1e-3)))
+    lines = make_lines(make_cost_answer({"knob": runs}, build_model(tolerance=1e-3)))
     assert "  1.000 ± 0.040  meets" in lines[2] and "unknown errors" in lines[3]
 
 
@@ -101,7 +101,7 @@ def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
     """A run without an error estimate neither meets nor misses its tolerance in sentences, table and page."""
     runs = [replace(make_cost(str(k), 1, 1e-4), tolerance=10.0**-k) for k in (2, 3, 4, 5)]
     forget_errors(runs[1], "b")
-    answer = make_answer({"tolerance": runs}, build_model(tolerance=1e-3))
+    answer = make_cost_answer({"tolerance": runs}, build_model(tolerance=1e-3))
     assert answer.verdict[:2] == (
         "At its tolerance 0.001 the scene takes 1 CPU s and does not have an error estimate of every measure, with a "
         "largest relative error of 0.0001 in a.",
@@ -113,7 +113,7 @@ def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
         forget_errors(known, "b")
     runs[-1].measures["b"] = Measure(2.0, "1", 2e-3)
     runs[-1] = replace(runs[-1], remedies=("use it",))
-    answer = make_answer({"tolerance": runs}, build_model(tolerance=1e-3))
+    answer = make_cost_answer({"tolerance": runs}, build_model(tolerance=1e-3))
     assert answer.verdict[1:] == ("No run is known to meet its tolerance.",)
     # the advice of a tolerance other than that of the scene
     assert answer.remarks.notes == ("With a knob at 5, b misses the tolerance: use it.",)
@@ -164,7 +164,7 @@ def test_exact_answer_states_when_a_run_takes_a_minute():
         replace(make_cost(label, seconds, 1e-9), tolerance=float(label))
         for label, seconds in (("0.01", 1.0), ("0.0001", 4.0))
     ]
-    sentence = make_answer({"tolerance": runs}, build_model(tolerance=0.01)).verdict[2]
+    sentence = make_cost_answer({"tolerance": runs}, build_model(tolerance=0.01)).verdict[2]
     expected = 1e-4 * 15 ** (-np.log(100) / np.log(4))
     assert sentence.endswith(
         f"a run takes a minute at a tolerance of {expected:.0e}.".replace("e-0", "e-")

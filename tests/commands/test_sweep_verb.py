@@ -67,7 +67,7 @@ def test_exact_sweep_case_equals_single_run(whole_sweep, rig_scene):
             and stored["outcome"] == single.outcome
         )
         assert stored["warnings"] == single.warnings and stored["notes"] == single.notes
-        expected = json.loads(json.dumps(store.make_summary(runs.make_answer(single))))
+        expected = json.loads(json.dumps(store.make_summary(runs.make_run_answer(single))))
         # a case of a batch does not store the method of each measure
         del expected["numerics"]["measures"]
         for part in ("patchfem", "title", "not_in_scene", "numerics"):

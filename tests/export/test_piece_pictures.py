@@ -8,7 +8,7 @@ from command_line import run_cli, run_successfully
 from exported import write_small_series
 from PIL import Image
 
-from patchfem.export.fields.film import contact_window, make_stress_panels
+from patchfem.export.fields.film import find_contact_window, make_stress_panels
 from patchfem.export.fields.vtkhdf import Block, Frames, read_frames
 from patchfem.export.pieces import draw_pieces, magnify_pieces
 
@@ -31,7 +31,7 @@ def test_exact_drawn_gap_is_magnified_gap(bench_folder, magnify):
     lower, upper, line = (frames.blocks[name] for name in ("lower", "upper", "interface"))
     slide = line.point_data["holder_slide"][:, 0].astype(float)
     assert np.abs(slide).max() > 1e-7
-    for window in (WHOLE, contact_window(frames)):
+    for window in (WHOLE, find_contact_window(frames)):
         drawn = magnify_pieces(frames, numbers, window, magnify)
         factor = float(re.match(r"motion × ([\d.e+]+)", drawn.captions[-1])[1])
         slide_factor = float(re.search(r"um × ([\d.e+-]+)$", drawn.captions[-1])[1])
@@ -130,5 +130,5 @@ def test_exact_window_follows_the_contact_of_a_graded_mesh():
     x = np.array([-10, -1, -0.1, 0, 0.1, 1, 10]) * 1e-3
     pressure = np.eye(7)[3:4]
     line = Block(x[:, None], np.zeros((0, 2)), {"normal_stress": pressure}, {})
-    window = contact_window(Frames("", np.zeros(1), {"interface": line}))
+    window = find_contact_window(Frames("", np.zeros(1), {"interface": line}))
     assert window == pytest.approx((-0.4e-3, 0.4e-3, -0.24e-3, 0.24e-3))

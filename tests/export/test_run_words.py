@@ -16,7 +16,7 @@ from patchfem.scene import read_template
 def get_verdict(scene, **sets) -> tuple:
     """Return the verdict of a scene and its result."""
     result = pf.run(scene, **sets)
-    return runs.make_answer(result).verdict, result
+    return runs.make_run_answer(result).verdict, result
 
 
 def test_exact_release_agrees_with_closed_form():

@@ -6,7 +6,7 @@ from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table
 
 import patchfem as pf
 from patchfem.convergence import ERROR_SAFETY_FACTOR
-from patchfem.response import convergence_errors
+from patchfem.response import estimate_convergence_errors
 from patchfem.response.errors import add_errors
 
 NAME = "relative_displacement_amplitude"
@@ -23,7 +23,7 @@ def make_sequence(*steps, order, size=1e-3):
 def test_exact_error_of_sequence_of_known_order(order, size, count):
     """For three or more runs of a known order, the stated error is ERROR_SAFETY_FACTOR times the true error."""
     runs = make_sequence(*2.0 ** np.arange(count), order=order, size=size)
-    assert convergence_errors(*runs)[NAME] == pytest.approx(
+    assert estimate_convergence_errors(*runs)[NAME] == pytest.approx(
         ERROR_SAFETY_FACTOR * abs(size), rel=1e-9
     )
 
@@ -31,21 +31,21 @@ def test_exact_error_of_sequence_of_known_order(order, size, count):
 @pytest.mark.parametrize("order", [0.5, 4.0])
 def test_always_errors_cover_orders_from_half_to_four(order):
     """The stated error covers the true one for orders from 1/2 to 4, although orders above 2 count as 2."""
-    assert convergence_errors(*make_sequence(1, 2, 4, order=order))[NAME] >= 1e-3
+    assert estimate_convergence_errors(*make_sequence(1, 2, 4, order=order))[NAME] >= 1e-3
 
 
 @pytest.mark.parametrize(("ratio", "order"), [(4.0, 2.0), (30.0, 1.0)])
 def test_exact_two_runs_use_given_order(ratio, order):
     """For two runs the given order determines the error; a measure absent from the coarser run gets none."""
     fine, coarse = make_sequence(1.0, ratio, order=order)
-    found = convergence_errors(fine | {"loop_area": 1.0}, coarse, ratio=ratio, order=order)
+    found = estimate_convergence_errors(fine | {"loop_area": 1.0}, coarse, ratio=ratio, order=order)
     assert found == {NAME: pytest.approx(ERROR_SAFETY_FACTOR * 1e-3)}
 
 
 def test_exact_time_fractions_have_sampling_error():
     """Fractions of time and phases have an error of the sampling interval, even if all runs agree."""
     same = {"open_fraction": 0.25, "slip_start_phase": 0.6, "stick_fraction": 0.2, NAME: 1.0}
-    assert convergence_errors(same, same, same, steps=128) == pytest.approx(
+    assert estimate_convergence_errors(same, same, same, steps=128) == pytest.approx(
         {
             "open_fraction": 4 / 128,
             "slip_start_phase": 1 / 128,

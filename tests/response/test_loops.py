@@ -59,10 +59,12 @@ def test_exact_jenkins_loop_agrees_with_closed_form(amplitude, length):
     area, _ = friction_forms.jenkins_loop(amplitude, length)
     assert work == pytest.approx(float(area), rel=1e-6, abs=1e-12)
     turns = loops.find_reversals(t, q, v, f, PERIOD)
-    assert loops.mean_half_range(turns) == pytest.approx(amplitude, rel=1e-12)
-    assert loops.secant_stiffness(turns) == pytest.approx(1 / max(amplitude, length), rel=1e-9)
-    found = loops.interface_loop(
-        loops.mean_half_range(turns), *fourier_coefficients(t, q, f), work, 0.5
+    assert loops.compute_mean_half_range(turns) == pytest.approx(amplitude, rel=1e-12)
+    assert loops.compute_secant_stiffness(turns) == pytest.approx(
+        1 / max(amplitude, length), rel=1e-9
+    )
+    found = loops.compute_interface_loop(
+        loops.compute_mean_half_range(turns), *fourier_coefficients(t, q, f), work, 0.5
     )
     turn = acos(1 - 2 * length / amplitude) if amplitude > length else pi
     stiffness = (turn - sin(2 * turn) / 2) / (pi * length)

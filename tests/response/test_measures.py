@@ -14,7 +14,7 @@ from patchfem.response import measures
 @given(st.floats(0, pi), st.floats(0, 0.22))
 def test_always_slip_start_phase_is_mean_modulo_pi(middle, spread):
     """Slip starts that agree modulo pi have their mean as the phase."""
-    found = measures.slip_start_measure(
+    found = measures.average_slip_starts(
         np.array([middle - spread, middle + spread, middle + pi, middle - 3 * pi])
     )
     found = found["slip_start_phase"]

@@ -202,6 +202,6 @@ def test_exact_block_on_belt_is_not_stuck(end, outcome):
             np.sqrt(0.17), abs=2e-7
         )
         # the belt loses a little speed
-        assert settling.slip_period(
+        assert settling.find_slip_period(
             result.response.time, result.response.slide_rate
         ) == pytest.approx(8 + 2 * (np.pi - np.arctan(4)), rel=2e-5)

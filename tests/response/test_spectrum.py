@@ -27,8 +27,8 @@ def test_order_motion_harmonic_is_four():
         y = 0.7 + np.sin(OMEGA * t) + 0.4 * np.cos(3 * OMEGA * t)
         v = OMEGA * (np.cos(OMEGA * t) - 1.2 * np.sin(3 * OMEGA * t))
         errors.append(
-            abs(spectrum.motion_harmonic(t, y, v, OMEGA) + 1j)
-            + abs(spectrum.motion_harmonic(t, y, v, 3 * OMEGA) - 0.4)
+            abs(spectrum.compute_motion_harmonic(t, y, v, OMEGA) + 1j)
+            + abs(spectrum.compute_motion_harmonic(t, y, v, 3 * OMEGA) - 0.4)
         )
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.2)
     assert errors[-1] < 1e-7
@@ -43,5 +43,5 @@ def test_exact_harmonics_of_jumping_acceleration(steps):
     speed = way * (part - PERIOD / 4)
     place = way * (part**2 / 2 - PERIOD / 4 * part)
     for n in (1, 3):
-        found = spectrum.acceleration_harmonic(t, place, speed, n * OMEGA)
+        found = spectrum.compute_acceleration_harmonic(t, place, speed, n * OMEGA)
         assert found == pytest.approx(-4j / (pi * n), abs=1e-3 if steps == 8 else 1e-9)

@@ -9,7 +9,7 @@ import patchfem as pf
 from patchfem.export import run_folder
 from patchfem.export.charts import panels
 from patchfem.export.rows import CHARTS
-from patchfem.export.runs import make_answer
+from patchfem.export.runs import make_run_answer
 from patchfem.model.face import average_over_cells
 from patchfem.surface.areal import Areal
 
@@ -167,10 +167,10 @@ def test_exact_wear_is_coefficient_times_load_times_path():
     )
     volume = 1e-15 * LOAD * 4 * 0.2e-6 * 1e5
     assert result.measures["worn_volume"].value == pytest.approx(volume, rel=1e-9)
-    variables = make_answer(result).data
+    variables = make_run_answer(result).data
     assert variables["wear_worn_depth"].dims == ("wear_frame", "y", "x")
     titles = [
-        panel.title for panel in panels.make_panels({"": make_answer(result)}, CHARTS["bench"])
+        panel.title for panel in panels.make_panels({"": make_run_answer(result)}, CHARTS["bench"])
     ]
     assert {"Worn depth over the face", "Pressure over the face"} <= {*titles}
 

@@ -3,11 +3,14 @@
 `test_advice_of_warnings.py` tests that an advice has the promised effect.
 """
 
+from pathlib import Path
+
 import pytest
 from scene_runs import find_sentences
 from scene_texts import BENCH, BLOCK, COULOMB, POINT, SHEAR, SHORT, SLIDE
 
 from patchfem import run
+from patchfem.runs.results.result import shorten_file_names
 
 LOOSE = "[accuracy]\ntolerance = 0.01\n"
 BONDS = POINT + '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\norder = 2\n'
@@ -53,3 +56,10 @@ def test_exact_note_on_stiffness_of_pieces_that_are_rigid_in_shear(shear, count)
     """Without [contact.shear] a note says that the motion does not use the tangential stiffness of the pieces."""
     notes = run(BLOCK + LOOSE + shear + COULOMB + SLIDE + "cycles = 1\n").notes
     assert len(find_sentences(notes, "rigid in shear without")) == count
+
+
+@pytest.mark.parametrize("folder", ["/data/my rig/", "C:\\data\\my rig\\", "D:/data/rig/"])
+def test_remarks_name_files_without_folders(folder):
+    """Remarks name a file without its folder, with the separators of either system."""
+    text = f"{folder}loop.csv: line 3: no number"
+    assert shorten_file_names([text], Path("scene.toml")) == ["loop.csv: line 3: no number"]

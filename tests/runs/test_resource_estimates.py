@@ -1,6 +1,6 @@
 """Memory of a run: its parts, the limits, and refusals before large arrays are allocated."""
 
-import os
+import mmap
 import re
 import tracemalloc
 
@@ -109,7 +109,7 @@ def test_exact_free_memory_of_control_groups(tmp_path):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    own = 3 * os.sysconf("SC_PAGE_SIZE")
+    own = 3 * mmap.PAGESIZE
     folder = tmp_path / "cgroup"
     assert memory.free_bytes(tmp_path, folder) == 8000 - 7000 + 10 + own
     (folder / "user.slice/job/memory.max").write_text("900")

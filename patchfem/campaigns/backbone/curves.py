@@ -11,7 +11,7 @@ from ...core import NotConverged, PatchfemError
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.source import locate_errors
-from ...response.errors import finer_errors
+from ...response.errors import estimate_errors_from_finer
 from ...runs.joint import find_stuck_patch_stiffness
 from ...scene.keys.removed import describe_removed
 from . import words
@@ -265,7 +265,7 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
             "these amplitudes; raise structure.reduced.modes"
         )
     values = curve.interpolate(curve.amplitude)
-    added = finer_errors(values, richer.interpolate(curve.amplitude))
+    added = estimate_errors_from_finer(values, richer.interpolate(curve.amplitude))
     errors = {}
     for name in CURVE_QUANTITIES:
         errors[f"{name}_error"] = getattr(curve, f"{name}_error") + added[name]

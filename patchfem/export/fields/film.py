@@ -18,7 +18,7 @@ MAX_SHOWN_CONTACT_FRACTION = 0.25
 MIN_FRAME_GAP_RATIO = 3.0
 
 
-def last_frames(times) -> np.ndarray:
+def select_last_frames(times) -> np.ndarray:
     """Return the numbers of the last frames whose times (f,) [s] follow each other closely.
 
     For a rig they are the frames of its last cycle, without the pressed state long before it; for a
@@ -31,7 +31,7 @@ def last_frames(times) -> np.ndarray:
     return np.arange(breaks[-1] + 1 if breaks.size else 0, len(times))
 
 
-def contact_window(frames: Frames) -> tuple[float, float, float, float]:
+def find_contact_window(frames: Frames) -> tuple[float, float, float, float]:
     """Return left, right, bottom and top [m] of a window around the contact in all frames.
 
     It is twice as wide as the contact, but at least eight elements there; around the largest pressure of a long contact it
@@ -70,10 +70,10 @@ def make_stress_panels(path: Path) -> list[Panel]:
         If the file is damaged.
     """
     frames = read_frames(path, {"normal_stress", "von_mises"})
-    cycle = last_frames(frames.times)
+    cycle = select_last_frames(frames.times)
     count = min(MAX_FILM_FRAMES, cycle.size)
     numbers = cycle[np.linspace(0, cycle.size - 1, count).round().astype(int)]
-    left, right, bottom, top = contact_window(frames)
+    left, right, bottom, top = find_contact_window(frames)
     columns, rows = FILM_GRID_POINTS
     x = np.linspace(left, right, columns)
     y = bottom + (top - bottom) * (np.arange(rows) + 0.5) / rows  # no row is on the interface

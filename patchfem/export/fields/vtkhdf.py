@@ -72,8 +72,8 @@ def make_blocks(pieces: Pieces) -> dict[str, Block]:
     fields |= pieces.interface
     segments = np.stack([np.arange(x.size - 1), np.arange(1, x.size)], axis=1)
     return {
-        "lower": _piece_block(pieces.lower),
-        "upper": _piece_block(pieces.upper),
+        "lower": _make_piece_block(pieces.lower),
+        "upper": _make_piece_block(pieces.upper),
         "interface": Block(_pad_components(x[:, None], 3), segments, _convert_fields(fields), {}),
     }
 
@@ -100,7 +100,7 @@ def make_face_blocks(result) -> dict[str, Block]:
     return {"interface": Block(points, corners, {}, _convert_fields(fields))}
 
 
-def _piece_block(piece: PieceFields) -> Block:
+def _make_piece_block(piece: PieceFields) -> Block:
     """Return the block of one piece."""
     cells = np.concatenate([block[:, [0, 1, 2, -1]] for block in piece.blocks])
     cell_data = {

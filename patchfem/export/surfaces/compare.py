@@ -22,7 +22,7 @@ from ...surface.spectrum import WAVE_BAND
 from ..answer import Answer, JsonObject, Remarks, Variables
 from ..rows import make_variables
 from . import shared, worn
-from .shared import SURFACE_NAMES, build_answer, make_band, make_maps, to_answers
+from .shared import SURFACE_NAMES, build_answer, convert_quantities, make_band, make_maps
 
 CHARTED_QUANTITIES = ("worn_depth_mean", "amplitude_ratio")  # quantities of the charts of pairs
 MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
@@ -62,7 +62,7 @@ def answer_files(
             "compare: piece needs predicted, the results folder of a run with [wear]"
         )
     comparison = compare.compare_files(before, after, options)
-    answer = make_answer(comparison)
+    answer = make_comparison_answer(comparison)
     if predicted is None:
         return answer
     return worn.add_predicted(answer, comparison, predicted, piece)
@@ -99,10 +99,10 @@ def compare_with_scene(
     """
     comparison = compare.compare_files(before, after, options)
     paths = pressing.write_common_traces(comparison, folder)
-    return _add_pressed(make_answer(comparison), run_surfaces(*paths))
+    return _add_pressed(make_comparison_answer(comparison), run_surfaces(*paths))
 
 
-def make_answer(comparison: Comparison) -> Answer:
+def make_comparison_answer(comparison: Comparison) -> Answer:
     """Return the answer of a comparison of two surfaces: its sentences, quantities, curves and content of compare.json."""
     words = shared.describe_comparison(comparison)
     surfaces = (comparison.before, comparison.after)
@@ -120,7 +120,7 @@ def make_answer(comparison: Comparison) -> Answer:
             "band": WAVE_BAND,
             "direction": comparison.direction or None,
             **_describe_place(comparison),
-            "other_tracks": [to_answers(other.values) for other in comparison.tracks[1:]],
+            "other_tracks": [convert_quantities(other.values) for other in comparison.tracks[1:]],
             "removed": dict(zip(SURFACE_NAMES, comparison.evidence.removed, strict=True)),
             **_compare_roughness(comparison),
             "notes": file_notes,
@@ -139,7 +139,7 @@ def _describe_place(comparison: Comparison) -> JsonObject:
     names = ("shift_x", "shift_y", "rotation") if comparison.is_areal else ("shift",)
     names += ("significance",)
     values = comparison.values if placement is None else comparison.values | placement.values
-    registration = to_answers({name: values[name] for name in names if name in values})
+    registration = convert_quantities({name: values[name] for name in names if name in values})
     registration["mirrored"] = bool(placement and placement.mirrored)
     basis = placement.basis if placement is not None else ""
     return {"reference": basis or None, "registration": registration}
@@ -151,7 +151,7 @@ def _compare_roughness(comparison: Comparison) -> JsonObject:
     content = {"cutoff": evidence.cutoff, "inside": None, "outside": None}
     rows = {}
     for region, sides in evidence.roughness.items():
-        content[region] = {side: to_answers(values) for side, values in sides.items()}
+        content[region] = {side: convert_quantities(values) for side, values in sides.items()}
         for name in content[region]["before"]:
             row = {side: entries[name] for side, entries in content[region].items()}
             rows[f"{name} {region}"] = row | {"cutoff": {"value": evidence.cutoff, "unit": "m"}}

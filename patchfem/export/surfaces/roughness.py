@@ -73,10 +73,12 @@ def answer_files(paths: list[Path], units: tuple[str, str] | None = None, **opti
     PatchfemError
         If a file cannot be read or evaluated.
     """
-    return make_answer([report.make_report(read_surface(path, units), **options) for path in paths])
+    return make_roughness_answer(
+        [report.make_report(read_surface(path, units), **options) for path in paths]
+    )
 
 
-def make_answer(reports: list[RoughnessReport]) -> Answer:
+def make_roughness_answer(reports: list[RoughnessReport]) -> Answer:
     """Return the answer of the reports of one or several surfaces."""
     # Traces and scans have different parameters, so that each kind has its own headline.
     quantities, means, headlines, cautions = {}, [], [], []
@@ -95,7 +97,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
             values = {key: mean.mean for key, mean in averages.items()}
             state = f"Mean of {len(members)} {name}: "
         headlines.append(f"{state}{_format_main_parameters(values, members)}.")
-        quantities |= shared.to_answers(values)
+        quantities |= shared.convert_quantities(values)
 
     # A treatment that several surfaces share is named once, after the headlines.
     notes = [text for report in reports for text in report.notes]
@@ -216,7 +218,7 @@ def report_to_dict(roughness: RoughnessReport) -> JsonObject:
         "profile",
         roughness,
         confidence=TRACE_INTERVAL_PROBABILITY if has_interval else None,
-        measures=shared.to_answers({value.name: value for value in roughness.values}),
+        measures=shared.convert_quantities({value.name: value for value in roughness.values}),
     )
     if roughness.kind == "areal":
         return content

@@ -82,7 +82,7 @@ def to_answer(quantity: Quantity) -> answer.Quantity:
     return answer.Quantity(value, unit, low=low, high=high, reason=reason)
 
 
-def to_answers(values: dict[str, Quantity]) -> answer.Quantities:
+def convert_quantities(values: dict[str, Quantity]) -> answer.Quantities:
     """Convert measured quantities by name."""
     return {name: to_answer(quantity) for name, quantity in values.items()}
 
@@ -234,15 +234,15 @@ def build_answer(
         "sentences": [*words.verdict[1:], *words.warnings, *words.notes],
         "confidence": CONFIDENCE_LEVEL,
         **dict(zip(SURFACE_NAMES, sources, strict=True)),
-        **to_answers(values),
-        "track": to_answers(track) or None,
+        **convert_quantities(values),
+        "track": convert_quantities(track) or None,
     }
 
     return answer.Answer(
         kind="compare",
         title=" and ".join(Path(source).name for source in sources),
         verdict=words.verdict,
-        quantities=to_answers(shown),
+        quantities=convert_quantities(shown),
         data=data,
         remarks=Remarks(words.warnings, words.notes),
         details=content | details,

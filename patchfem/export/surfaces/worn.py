@@ -95,7 +95,7 @@ def read_patch(folder: Path) -> PatchRun:
     x = data["x"].values
     y = data["y"].values if "y" in data else None
     shape = x.shape if y is None else (y.size, x.size)
-    depth = worn_depths(answer)[-1] if "wear" in scene else np.zeros(x.size)
+    depth = read_worn_depths(answer)[-1] if "wear" in scene else np.zeros(x.size)
     weight = data["weight"].values
     fields = (weight, data["unloaded_gap"].values, depth)
     try:
@@ -113,7 +113,7 @@ def read_patch(folder: Path) -> PatchRun:
     return PatchRun(answer, scene, state)
 
 
-def worn_depths(answer: Answer) -> np.ndarray:
+def read_worn_depths(answer: Answer) -> np.ndarray:
     """Return the worn depth [m] of both pieces after the cycles of `wear_frame`: (f, m), or (f, ny, nx) over a face."""
     if "wear_worn_depth" not in answer.data:
         raise PatchfemError("result.nc contains no wear_worn_depth; run the scene again")
@@ -142,7 +142,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     # The fit has the wear coefficient, the position of the patch, and both depths along it.
     fitted = predicted_wear.fit_wear(_measure_depth(comparison), read_history(folder, piece))
     numbers = {"wear_coefficient": fitted.coefficient, "patch_centre": fitted.centre}
-    values = shared.to_answers(numbers)
+    values = shared.convert_quantities(numbers)
     sentence = describe_fit(fitted)
     notes = describe_reliability(fitted)
     warnings = warn_of_other_shape(fitted)
@@ -248,7 +248,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
             raise PatchfemError(f"compare --predicted {folder}: {text}")
 
     # Worn depth of both pieces in each frame of the wear; of frames of the same cycle the first one counts.
-    depth = worn_depths(run.answer)
+    depth = read_worn_depths(run.answer)
     if not depth[-1].max() > 0:
         raise PatchfemError(f"compare --predicted {folder}: nothing wore off in this run")
     cycles = run.answer.data["wear_frame"].values
@@ -354,10 +354,10 @@ def answer_runs(before: Path, after: Path) -> Answer:
         raise PatchfemError(
             f"{after}: this run has no [wear], so nothing wore off; give the run with [wear] as the second folder"
         )
-    return make_answer(runs, between_runs.measure_wear(runs[0].state, runs[1].state))
+    return make_wear_answer(runs, between_runs.measure_wear(runs[0].state, runs[1].state))
 
 
-def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
+def make_wear_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     """Return the answer on the wear of a patch between two runs: its sentences, quantities and curves."""
     verdict = describe_wear(runs, wear)
     # Measures and warnings of the run before and of the run after.

@@ -28,7 +28,7 @@ MAX_FAILURE_MESSAGES = 5  # messages of failed cases among the warnings
 MAX_CASES_TRIED = 3  # cases that are tried until one is valid, for the tolerance of all
 
 
-def make_answer(
+def make_sweep_answer(
     sweep_scene: SweepScene, cases: Cases, table: SweepTable, case_folders: Sequence[str] = ()
 ) -> Answer:
     """Make the answer of a sweep.

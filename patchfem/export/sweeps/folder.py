@@ -167,7 +167,7 @@ class Chunks:
             path.unlink()
 
 
-def case_folder_name(name: int) -> str:
+def name_case_folder(name: int) -> str:
     """Return the 64-bit name of a case as 16 hexadecimal digits, as its folder in cases/ is called."""
     return f"{int(name):016x}"
 
@@ -250,7 +250,7 @@ class Writer:
         from ..run_folder import draw_page, write_results
 
         with ResultsFolder(
-            self.target / CASES_FOLDER / case_folder_name(self.names[number])
+            self.target / CASES_FOLDER / name_case_folder(self.names[number])
         ) as folder:
             write_results(result, folder.path, self._name_case(number))
             fault = draw_page(folder.path) if self.keep == "pages" else None
@@ -279,7 +279,7 @@ class Writer:
             for case, text in enumerate(texts):
                 # The other cases have a results folder already.
                 if self.keep == "summaries" or case in results.messages:
-                    folder = self.target / CASES_FOLDER / case_folder_name(names[case])
+                    folder = self.target / CASES_FOLDER / name_case_folder(names[case])
                     folder.mkdir(parents=True, exist_ok=True)
                     write_text(folder / answers.SUMMARY_FILE, text)
             write_chunk(self.target / CHUNKS_FOLDER, names, results)
@@ -392,15 +392,15 @@ class Folder:
             is_stored[numbers] = True
             for case, number in enumerate(numbers.tolist()) if required else ():
                 files = required[:1] if case in results.messages else required  # a case that failed
-                folder = self.target / CASES_FOLDER / case_folder_name(self.chunks.names[number])
+                folder = self.target / CASES_FOLDER / name_case_folder(self.chunks.names[number])
                 is_stored[number] = all((folder / name).is_file() for name in files)
         return is_stored
 
-    def case_folder_names(self) -> list[str]:
+    def list_case_folder_names(self) -> list[str]:
         """Return the folder names of the cases in cases/, or [] if no case has a folder."""
         if not (self.target / CASES_FOLDER).is_dir():
             return []
-        return [case_folder_name(name) for name in self.chunks.names]
+        return [name_case_folder(name) for name in self.chunks.names]
 
     def remove_tables(self, *names: str) -> None:
         """Remove some of the tables; all without names."""
@@ -419,7 +419,7 @@ class Folder:
         """
         self.chunks.merge_files(removes_others=removes_others)
         remove_partial_files(self.target)
-        own = set() if keep == "none" else set(self.case_folder_names())
+        own = set() if keep == "none" else set(self.list_case_folder_names())
         stored = set(self.chunks.list_files())
         stored |= {self.target / CASES_FOLDER / name for name in own}
         for folder in (CHUNKS_FOLDER, CASES_FOLDER):

@@ -19,7 +19,7 @@ from ...runs.batch.case_results import CaseResults
 from .. import page as pages
 from .. import store as answers
 from ..answer import Answer
-from .answer import identify_sweep, make_answer, read_tolerance, sort_measures
+from .answer import identify_sweep, make_sweep_answer, read_tolerance, sort_measures
 from .folder import Folder, Writer
 
 MAX_CASES_WITH_SUMMARY = 1000  # cases whose summaries are stored by default
@@ -188,10 +188,10 @@ def write_tables(
         return None
 
     folder.remove_tables("sweep.csv", answers.PAGE_FILE)
-    names = folder.case_folder_names()
+    names = folder.list_case_folder_names()
     if is_collected or len(table) <= MAX_CASES_WITH_TABLES:
         write_csv(cases, table, names, folder.target / "sweep.csv")
-    answers.write_answer(make_answer(sweep_scene, cases, table, names), folder.target)
+    answers.write_answer(make_sweep_answer(sweep_scene, cases, table, names), folder.target)
     del table  # its memory is needed for the page, which is made from the files
     if page:
         pages.write_report(folder.target)
@@ -270,7 +270,7 @@ def compute_in_memory(
     work = WorkerData(sweep_scene, cases)
     for numbers, results, _ in iterate_chunks(work, range(len(cases)), executor, say):
         table.insert(numbers, results)
-    return make_answer(sweep_scene, cases, table)
+    return make_sweep_answer(sweep_scene, cases, table)
 
 
 def collect_shards(

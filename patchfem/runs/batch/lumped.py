@@ -32,7 +32,7 @@ from ...points.cases import CaseMarch, is_linear_between_events, list_parameters
 from ...points.law_rows import Law, LawNumber
 from ...points.laws import N_NUMBERS, POINT_LAWS, list_point_law
 from ...response import rows
-from ...response.errors import ERROR_MEASURES, convergence_errors, total_error
+from ...response.errors import ERROR_MEASURES, combine_errors, estimate_convergence_errors
 from ...response.outcome import (
     AMPLITUDE_ROUND_OFF,
     describe_ringing,
@@ -45,16 +45,16 @@ from ...response.rows import (
     INTERNAL_VALUES,
     MOTION_TABLE,
     STEADY_AMPLITUDE,
-    error_floor,
-    larger_term,
+    find_error_floor,
+    find_larger_term,
     select_names,
 )
 from ...response.settling import (
     MOTION_CLASSES,
     MotionEnds,
+    estimate_ringing,
     judge_motions,
     measure_windows,
-    remaining_ringing,
     select_reported,
 )
 from ...scene.rules.accuracy import list_fixed_settings
@@ -326,7 +326,7 @@ def find_size(name: str, values: dict[str, np.ndarray]) -> np.ndarray:
 
     `name` is that of the measure, and `values` (n,) are all measures of the cases by name.
     """
-    return np.fmax(np.abs(values[name]), larger_term(name, values))
+    return np.fmax(np.abs(values[name]), find_larger_term(name, values))
 
 
 def estimate_errors(
@@ -346,7 +346,7 @@ def estimate_errors(
     fine = marches[0]
     repeat_error = find_repeat_error(group, SAME_SMOOTH_CYCLE / steps**3)
     with np.errstate(all="ignore"):
-        errors = convergence_errors(*marches, order=BATCH_ORDER, max_order=BATCH_ORDER)
+        errors = estimate_convergence_errors(*marches, order=BATCH_ORDER, max_order=BATCH_ORDER)
 
         # A change that is small by accident does not give an error far below those of the other measures, relative to
         # the value of a measure or to the terms of a difference.
@@ -360,7 +360,7 @@ def estimate_errors(
         for name, part in zip(names, pooled * is_changed):
             errors[name] += part * sizes[name]
         for name, error in errors.items():
-            errors[name] = total_error(name, fine, [error], repeat_error)
+            errors[name] = combine_errors(name, fine, [error], repeat_error)
         return errors
 
 
@@ -394,7 +394,7 @@ def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarra
             # The acceleration of the third harmonic is 9 omega^2 times a slide that has three times the phase.
             size = np.fmax(size, 1.0)
             relative = relative + 9 * INTEGRAL_REMAINDER * drive_phase * (3 * drive_phase) ** 5
-        errors[name] = total_error(name, values, [relative * size], repeat_error)
+        errors[name] = combine_errors(name, values, [relative * size], repeat_error)
 
     slide = values[AMPLITUDE] / np.abs(group.read(Number.OUTPUT))
     difference = np.where(values["slip_amplitude"] > 0, repeat_error, SAME_CASE_CYCLE)
@@ -446,7 +446,7 @@ def find_floor(name: str, values: dict[str, np.ndarray], group: Group) -> np.nda
     """Return the absolute part (n,) of the allowed error of a measure, in its unit.
 
     The allowed error is the tolerance times the value plus this floor. A small difference of large terms cannot have a
-    small relative error, so that the floor is at least the tolerance times these terms (`response.rows.larger_term`).
+    small relative error, so that the floor is at least the tolerance times these terms (`response.rows.find_larger_term`).
 
     Parameters
     ----------
@@ -457,8 +457,8 @@ def find_floor(name: str, values: dict[str, np.ndarray], group: Group) -> np.nda
     group : Group
         The n cases.
     """
-    floor = error_floor(name, values, group.displacement)
-    return np.fmax(floor, group.tolerance * larger_term(name, values))
+    floor = find_error_floor(name, values, group.displacement)
+    return np.fmax(floor, group.tolerance * find_larger_term(name, values))
 
 
 def _select(record, rows):
@@ -601,7 +601,7 @@ def _judge_motions(group: Group, refined: Refined) -> MotionEnds:
         refined.errors["drift_per_cycle"],
         values[AMPLITUDE],
         group.tolerance,
-        error_floor("drift_per_cycle", values, group.displacement),
+        find_error_floor("drift_per_cycle", values, group.displacement),
     )
     is_steady = classes == MOTION_CLASSES.index(Outcome.STEADY)
     return MotionEnds(
@@ -621,7 +621,7 @@ def find_visible_ringing(group: Group, refined: Refined) -> np.ndarray:
     """
     march = refined.march
     windows = measure_windows(march.extremes, group.window)
-    ringing = remaining_ringing(windows, group.decay * group.window)
+    ringing = estimate_ringing(windows, group.decay * group.window)
     amplitude = march.values[AMPLITUDE]
     floor = find_floor(AMPLITUDE, march.values, group)
     sizes = amplitude, refined.errors[AMPLITUDE], floor

@@ -12,19 +12,19 @@ import numpy as np
 from ...core import Response
 from ...motion_measures import energy_balance
 from ...response.loops import (
+    choose_reversal_force_rule,
+    compute_interface_loop,
+    compute_mean_half_range,
+    compute_secant_stiffness,
     find_reversals,
-    interface_loop,
-    mean_half_range,
-    reversal_force_rule,
     sample_loop,
-    secant_stiffness,
 )
 from ...response.measures import (
+    compare_loop_work,
     compute_ledger_measures,
     compute_peak,
     compute_step_harmonic,
     interpolate_range,
-    work_difference,
 )
 from ..results.patch_rows import Values
 from .engine import BenchEngine, choose_bench_engine, sample_path
@@ -112,12 +112,12 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
     engine = replace(engine, has_half_cells=settings.pop("has_half_cells", False))
     stored = _choose_frames(slide.size, frames)
     histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **settings))
-    jumps = reversal_force_rule(model) == "jumps"
+    jumps = choose_reversal_force_rule(model) == "jumps"
 
     # The measures of a loop exist only for a cyclic motion.
     values = _compute_measures(model, histories, first)
     values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}
-    values["work_check"] = work_difference(histories.ledger[0], [(slide, histories.force)], jumps)
+    values["work_check"] = compare_loop_work(histories.ledger[0], [(slide, histories.force)], jumps)
 
     span = time[-1]  # Scaling by the time span avoids overflow for extremely slow motions.
     rate = np.zeros(time.size)
@@ -170,7 +170,7 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Val
     ratio = np.divide(force, applied, out=np.zeros_like(force), where=is_loaded)
 
     # A force that depends on the slide alone is largest at a reversal, which is a sample.
-    is_sampled = model.grooves is None and reversal_force_rule(model) == "slide"
+    is_sampled = model.grooves is None and choose_reversal_force_rule(model) == "slide"
     find_peak = _find_largest if is_sampled else compute_peak
 
     # Energy balance: work - change of stored energy - dissipated + created = 0.
@@ -224,14 +224,19 @@ def _compute_loop_measures(
     means = np.divide(np.diff(work), moves, out=mean_force, where=moves != 0)
 
     reversals = find_reversals(
-        time, slide, np.zeros(time.size), force, time[-1] - time[0], reversal_force_rule(model)
+        time,
+        slide,
+        np.zeros(time.size),
+        force,
+        time[-1] - time[0],
+        choose_reversal_force_rule(model),
     )
 
     # Without a mode there is no stiffness that damping could refer to, hence the 0.
     harmonic = compute_step_harmonic(time, means, omega)
     loop = sample_loop(time, slide, harmonic, omega, work[-1] - work[0])
-    measures = interface_loop(mean_half_range(reversals), *loop, 0.0)
-    secant = secant_stiffness(reversals)
+    measures = compute_interface_loop(compute_mean_half_range(reversals), *loop, 0.0)
+    secant = compute_secant_stiffness(reversals)
     if secant is not None:
         measures["secant_stiffness"] = secant
     return measures | {"drift_per_cycle": float(slide[-1] - slide[0])}

@@ -20,7 +20,7 @@ from ...elasticity.sides import BlockShape
 from ...model.face import compute_face_gap
 from ...model.patch import PatchModel
 from ...model.pieces import make_layer_stacks
-from ...response.errors import convergence_errors
+from ...response.errors import estimate_convergence_errors
 from ..results.patch_rows import CELLS_SOURCE, Values, make_measure
 from . import store
 from .measures import (
@@ -276,7 +276,7 @@ def with_face_measures(
 ) -> "tuple[AreaPatch | None, ...]":
     """Return a face on successive grids, of which the finest one has its static measures with their errors.
 
-    The errors follow from the changes over the grids (`convergence_errors`). Without a second grid they are None.
+    The errors follow from the changes over the grids (`estimate_convergence_errors`). Without a second grid they are None.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def with_face_measures(
     pieces = patch.model.pieces
     series = [compute_face_values(one) for one in patches if one is not None]
     values = series[0]
-    errors = convergence_errors(*series) if len(series) > 1 else {}
+    errors = estimate_convergence_errors(*series) if len(series) > 1 else {}
     larger_terms = list_larger_terms(values, pieces.length / 2, pieces.width / 2)
     active = patch.pressed.pressure > 0
     n_edge_sides = sum(np.count_nonzero(np.diff(active, axis=axis)) for axis in (0, 1))

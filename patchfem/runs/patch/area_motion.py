@@ -10,7 +10,7 @@ import numpy as np
 
 from ...effects import law_has_trait
 from ...friction.record import make_law
-from ...response.errors import convergence_errors
+from ...response.errors import estimate_convergence_errors
 from ...slip import first_loading
 from ..results.patch_rows import CELLS_SOURCE, make_measure
 from . import jenkins_elements, store
@@ -90,7 +90,7 @@ def add_reversal_measure(result, coarse: Sequence[AreaPatch | None]):
     known = [{name: state.stick_fraction} for state in states if state is not None]
     if states[0] is None:
         return result
-    errors = convergence_errors(*known) if len(known) > 1 else {}
+    errors = estimate_convergence_errors(*known) if len(known) > 1 else {}
     measure = make_measure(name, known[0][name], errors.get(name), CELLS_SOURCE)
     if not errors:
         measure = replace(

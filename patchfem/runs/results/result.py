@@ -31,8 +31,8 @@ UNBOUNDED_OUTCOMES = (
     Outcome.LEAVES_GROOVES,
     Outcome.NOT_CONVERGED,
 )
-# Folder of an absolute path at the start of a remark.
-_FOLDER_OF_PATH = re.compile(r"/[^:]*/(?=[^/:]+: )")
+# Folder of an absolute path at the start of a remark; on Windows a path starts with the letter of its drive.
+_FOLDER_OF_PATH = re.compile(r"(?:[A-Za-z]:[\\/]|/)[^:]*[\\/](?=[^\\/:]+: )")
 
 
 class Advice(NamedTuple):
@@ -426,12 +426,12 @@ def shorten_file_names(texts: Iterable[str], path: Path) -> list[str]:
     File names become relative to the folder of the scene, whose path is `path`.
     """
     folders = (path.parent, path.parent.absolute())
-    prefixes = [f"{folder}/" for folder in folders if folder.is_absolute()]
+    prefixes = [str(folder / "x")[:-1] for folder in folders if folder.is_absolute()]
     short_texts = []
     for text in texts:
         for prefix in prefixes:
             text = text.replace(prefix, "")
-        if text.startswith("/"):
-            text = _FOLDER_OF_PATH.sub("", text, count=1)
+        if match := _FOLDER_OF_PATH.match(text):
+            text = text[match.end() :]
         short_texts.append(rewrite_powers_of_ten(text))
     return short_texts

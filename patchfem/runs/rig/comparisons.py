@@ -16,12 +16,12 @@ from ...model.model import Model
 from ...response.errors import (
     CoarserRuns,
     ComparisonRuns,
-    absolute_change,
-    convergence_errors,
+    compute_absolute_changes,
+    compute_friction_errors,
     edge_errors,
+    estimate_convergence_errors,
+    estimate_errors_from_finer,
     estimate_sampling_errors,
-    finer_errors,
-    friction_errors,
     second_order_errors,
 )
 from ...response.measures import Values
@@ -51,7 +51,11 @@ def list_time_runs(numerics: Numerics) -> ComparisonRuns:
         coarse = enlarge_hybrid_steps(numerics)
         return [CoarserRuns((coarse,), partial(estimate_hybrid_errors, rtol=numerics.local))]
     runs = (divide_steps(numerics, 2), divide_steps(numerics, 4))
-    return [CoarserRuns(runs, partial(convergence_errors, steps=numerics.steps), source="steps")]
+    return [
+        CoarserRuns(
+            runs, partial(estimate_convergence_errors, steps=numerics.steps), source="steps"
+        )
+    ]
 
 
 def list_space_runs(
@@ -103,7 +107,7 @@ def list_space_runs(
     others = () if model.rig is None else model.rig.structure.other_rigs
     if others:
         runs = tuple(replace(numerics, other_rig=number) for number in range(len(others)))
-        coarser_runs.append(CoarserRuns(runs, finer_errors, beside, "reduced"))
+        coarser_runs.append(CoarserRuns(runs, estimate_errors_from_finer, beside, "reduced"))
     return coarser_runs
 
 
@@ -148,7 +152,7 @@ def _list_mesh_runs(
         has_elements = bool(model.partial_slip) and count is None
         rule = _choose_mesh_rule(model.side, has_elements=has_elements)
         if has_cells and rule is second_order_errors:
-            rule = convergence_errors
+            rule = estimate_convergence_errors
         # A second coarser mesh shows the order. The elements of a rig have one, as those between masses.
         is_single = rule is second_order_errors or (has_elements and model.rig is not None)
         n_meshes = 1 if is_single or beside is None else 2
@@ -172,7 +176,7 @@ def _choose_mesh_rule(side: str, *, has_elements: bool):
     """Return the rule of the error by the mesh of an interface, whose piece on a `side` has the pressure."""
     if side == "lower":
         return edge_errors
-    return convergence_errors if has_elements else second_order_errors
+    return estimate_convergence_errors if has_elements else second_order_errors
 
 
 def _list_bond_sum_runs(
@@ -212,7 +216,7 @@ def _list_bond_sum_runs(
             cycle_work *= model.rig.drive.signal.period / span
         load = solution.book.get("peak_load", first_interface_load(model, patch))
         works = (solution.book["passed"], cycle_work)
-        return friction_errors(values, error, model.friction, load, works)
+        return compute_friction_errors(values, error, model.friction, load, works)
 
     # The change of the motion adds to the bound where strips or the tail are coarse.
     coarser_runs = [CoarserRuns((), bound_errors, source="bonds")]
@@ -224,7 +228,7 @@ def _list_bond_sum_runs(
         )
         narrow = replace(beside, choice=finer)
         same = replace(beside, choice=choice)
-        coarser_runs.append(CoarserRuns((narrow,), finer_errors, same, "bonds"))
+        coarser_runs.append(CoarserRuns((narrow,), estimate_errors_from_finer, same, "bonds"))
     return coarser_runs
 
 
@@ -238,5 +242,5 @@ def list_joint_runs(inputs, space_runs: ComparisonRuns) -> ComparisonRuns:
     for kind in space_runs:
         if inputs.stiffer is not None and kind.runs and kind.runs[0].coarse_patch:
             stiffer = replace(kind.runs[0], coarse_patch=0, stiffer_joint=True)
-            return [CoarserRuns((stiffer,), absolute_change, kind.reference, "mesh")]
+            return [CoarserRuns((stiffer,), compute_absolute_changes, kind.reference, "mesh")]
     return []

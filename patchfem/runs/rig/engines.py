@@ -15,7 +15,7 @@ import numpy as np
 from ... import friction, hybrid, structure
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
-from ...response.errors import absolute_change
+from ...response.errors import compute_absolute_changes
 from ...response.measures import Values
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
@@ -94,7 +94,7 @@ def estimate_hybrid_errors(values: Values, coarse_values: Values, rtol: float) -
         Step tolerance of the run.
     """
     errors = {}
-    for name, change in absolute_change(values, coarse_values).items():
+    for name, change in compute_absolute_changes(values, coarse_values).items():
         errors[name] = hybrid.runs.estimate_error(change, values[name], rtol)
     return errors
 

@@ -32,8 +32,8 @@ from ...response.events import (
     make_no_onset_reason,
     make_onset_test,
 )
-from ...response.loops import CycleLoop, reversal_force_rule, sample_loop
-from ...response.measures import Measures, Values, relative_gap
+from ...response.loops import CycleLoop, choose_reversal_force_rule, sample_loop
+from ...response.measures import Measures, Values, compare_friction_works
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.rows import AMPLITUDE, MOTION_TABLE, STEADY_AMPLITUDE, LastCycles, compute_measures
 from ..results.result import Settings, SteadyData
@@ -580,7 +580,7 @@ class RunEvaluator:
         drive = drive or model.rig.drive.signal
         fields = {"window": run.window, "run_energies": run.ledger}
         if self.has_friction:
-            fields |= {"reversal_rule": reversal_force_rule(model), "ledger": ledger}
+            fields |= {"reversal_rule": choose_reversal_force_rule(model), "ledger": ledger}
 
         if model.rig.drive.kind == "free":
             # The last whole cycle of a release may begin before the window.
@@ -672,4 +672,6 @@ def compute_work_check(energies: Values) -> float:
         energy balance, and "passed" the integral of its absolute value.
     """
     scale = energies["power"] + energies["peak_stored"]
-    return relative_gap(energies["sampled"], energies["booked"], energies["passed"], scale)
+    return compare_friction_works(
+        energies["sampled"], energies["booked"], energies["passed"], scale
+    )

@@ -18,7 +18,7 @@ from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid, masing
 from ...hybrid.measures import compute_energies
 from ...hybrid.records import Margin, Memory, State, Status
-from ...response.errors import ERROR_MEASURES, absolute_change
+from ...response.errors import ERROR_MEASURES, compute_absolute_changes
 from ...response.events import (
     SEGMENT_BORDER,
     Events,
@@ -401,7 +401,7 @@ class LumpedEvaluator(RunEvaluator):
         thinned = replace(run, window=run.window.select(samples))
         coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
         errors = {}
-        for name, change in absolute_change(values, coarse_values).items():
+        for name, change in compute_absolute_changes(values, coarse_values).items():
             if change > 0 and name not in ERROR_MEASURES:
                 row = find_definition(name)
                 error = convergence_error(change, order=row.order)

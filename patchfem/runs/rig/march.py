@@ -12,7 +12,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...response.loops import CycleLoop
-from ...response.measures import Values, compute_step_harmonic, peak_sampling_errors
+from ...response.measures import Values, bound_sampling_errors, compute_step_harmonic
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ...time_steps import time_march as engine
 from . import bands
@@ -133,7 +133,7 @@ class MarchEvaluator(RunEvaluator):
         values : dict of float
             Measures by name.
         """
-        return peak_sampling_errors(run.window) | dict.fromkeys(
+        return bound_sampling_errors(run.window) | dict.fromkeys(
             self._find_release_forces(run.window), 0.0
         )
 

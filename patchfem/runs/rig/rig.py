@@ -27,7 +27,7 @@ from ...response.errors import (
 from ...response.measures import Measures
 from ...response.outcome import judge_outcome, remove_errors
 from ...response.rows import set_final_floors
-from ...response.settling import slip_period
+from ...response.settling import find_slip_period
 from .. import refine
 from ..bench import bench
 from ..results.interfaces import check_pieces_overlap
@@ -486,7 +486,7 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
     if model.friction is None or not drive.segments or structure.drive_sizes.is_periodic(drive):
         return 0
     response = solution.response
-    n_cycles = ceil(slip_period(response.time, response.slide_rate) / drive.period)
+    n_cycles = ceil(find_slip_period(response.time, response.slide_rate) / drive.period)
     return n_cycles if 2 * n_cycles <= numerics.cycles else 0
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...convergence import convergence_error
 from ...core import Outcome, frozen_array
 from ...formatting import format_length, format_number
-from ...response.errors import convergence_errors
+from ...response.errors import estimate_convergence_errors
 from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
 from ..results.result import UNBOUNDED_OUTCOMES, WearHistory
 from .evolve import (
@@ -213,7 +213,7 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool =
     coarse = []
     for patch, depth in zip(evolved.coarse, evolved.depths):
         coarse.append(compute_worn_volume_and_depth(patch, depth))
-    mesh_errors = convergence_errors(values, *coarse) if coarse else {}
+    mesh_errors = estimate_convergence_errors(values, *coarse) if coarse else {}
 
     # The errors of jumps, slip path, mesh, round-off and earlier run add up.
     start = model.wear.start

@@ -33,7 +33,7 @@ STATED = {
 @pytest.fixture(scope="module", params=["traces", "scans"])
 def written(request, tmp_path_factory):
     """Return the answer of a comparison and the folder with its files and page."""
-    answer = compare.make_answer(compare_pair(request.param == "scans"))
+    answer = compare.make_comparison_answer(compare_pair(request.param == "scans"))
     folder = tmp_path_factory.mktemp(request.param)
     store.write_answer(answer, folder)
     page.write_report(folder)
@@ -48,7 +48,7 @@ def parse(entry: dict) -> Quantity:
 @pytest.mark.parametrize("code", VERDICTS)
 def test_exact_headline_of_each_verdict(code):
     """The headline states what the code means with its numbers in at most 30 words, in at most four sentences."""
-    answer = compare.make_answer(
+    answer = compare.make_comparison_answer(
         compare_traces(code, has_place=code not in ("elsewhere", "identical"))
     )
     assert STATED[code] in answer.verdict[0]
@@ -62,7 +62,7 @@ def test_exact_headline_of_each_verdict(code):
 def test_exact_each_finding_has_a_sentence_with_its_numbers(code):
     """A finding becomes one sentence of the verdict, the warnings or the notes, and all its numbers stand in it."""
     plain, answer = (
-        compare.make_answer(compare_traces(findings=found))
+        compare.make_comparison_answer(compare_traces(findings=found))
         for found in ({}, {code: FINDINGS[code]})
     )
     texts = [*answer.verdict, *answer.remarks.warnings, *answer.remarks.notes]
@@ -127,7 +127,7 @@ def test_exact_ends_of_an_interval_have_the_last_digit_of_the_value(numbers, tex
 def test_exact_curves_are_in_csv_and_netcdf():
     """depth.csv and result.nc hold x, both heights and the depth of the comparison, and the ends of its track."""
     comparison = compare_traces()
-    answer = compare.make_answer(comparison)
+    answer = compare.make_comparison_answer(comparison)
     rows = list(csv.reader(store.format_curves(answer)["depth.csv"].splitlines()))
     assert rows[0] == ["x [m]", "before [m]", "after [m]", "depth [m]"]
     table = np.array(rows[1:], float)

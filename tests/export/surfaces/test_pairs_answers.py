@@ -15,7 +15,7 @@ def make_rows() -> list[dict]:
     """Return three pairs of one group, one of another group and one that failed."""
     rows = []
     for line, depth in enumerate((*DEPTHS, 2e-6), 2):
-        details = compare.make_answer(compare_traces()).details
+        details = compare.make_comparison_answer(compare_traces()).details
         details["worn_depth_mean"] |= {"value": depth, "low": 0.99 * depth, "high": 1.01 * depth}
         labels = {"group": "b" if line == 5 else "a", "part": f"no. {line}"}
         rows.append(details | {"line": line, "labels": labels, "outcome": "done", "message": ""})

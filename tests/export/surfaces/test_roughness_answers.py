@@ -28,7 +28,7 @@ def make_sine(amplitude: float = AMPLITUDE, name: str = "sine.csv") -> Profile:
 @pytest.fixture(scope="module")
 def sine_folder(tmp_path_factory):
     """Return the answer on a sine with a cut-off, and the folder with its files and page."""
-    answer = roughness.make_answer([make_report(make_sine(), cutoff=8e-4)])
+    answer = roughness.make_roughness_answer([make_report(make_sine(), cutoff=8e-4)])
     folder = tmp_path_factory.mktemp("sine")
     store.write_answer(answer, folder)
     page.write_report(folder)
@@ -73,7 +73,7 @@ def test_exact_mean_of_files_uses_student_t():
     """The means over three traces are those of their values, with the interval of Student's t of the logarithm."""
     sizes = (1.0, 1.1, 1.3)
     traces = [make_sine(size * AMPLITUDE, f"{size}.csv") for size in sizes]
-    answer = roughness.make_answer([make_report(trace) for trace in traces])
+    answer = roughness.make_roughness_answer([make_report(trace) for trace in traces])
     values = np.array([entry["measures"]["Pa"]["value"] for entry in answer.details["profiles"]])
     (means,) = answer.details["means"]
     mean = means["measures"]["Pa"]
@@ -92,7 +92,7 @@ def test_exact_scan_has_areal_parameters_and_a_map():
     """A scan of four waves along x has Sq = A/sqrt(2), its map and no profile."""
     x = np.arange(160) * 2e-6
     z = np.tile(AMPLITUDE * np.cos(2 * np.pi * x / WAVELENGTH), (90, 1))
-    answer = roughness.make_answer([make_report(Areal(x, x[:90], z, "scan.csv"))])
+    answer = roughness.make_roughness_answer([make_report(Areal(x, x[:90], z, "scan.csv"))])
     assert answer.quantities["Sq"].value == pytest.approx(AMPLITUDE / np.sqrt(2), rel=1e-3)
     assert answer.verdict[0].startswith("Sa ") and "no L-filter" in answer.verdict[1]
     assert answer.data["height_map"].values.shape == (90, 160) and "primary" not in answer.data

@@ -204,9 +204,9 @@ def _begin_process(work: WorkerData, say: Callable | None) -> None:
     `say` prints a line of text, or is None.
     """
     # The process that started the sweep handles interrupts.
-    for name in ("SIGINT", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "SIGHUP"):  # not on Windows
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
     _PROCESS_DATA[:] = work, say
     Thread(target=_end_with_parent, daemon=True).start()
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ....core import NotConverged, Response, SineDrive
 from ....formatting import format_quantity
-from ....response.errors import absolute_change
+from ....response.errors import compute_absolute_changes
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ...results.patch_rows import Arrays
@@ -454,7 +454,7 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
         )
         max_position_error = max(max_position_error, position_error)
         neighbour = finder.compute_point_values(points[best + direction * number])
-        for name, difference in absolute_change(solution.values, neighbour).items():
+        for name, difference in compute_absolute_changes(solution.values, neighbour).items():
             position_errors[name] = max(
                 position_errors[name], difference * position_error / far if far else difference
             )

@@ -22,7 +22,7 @@ from ....hybrid.periodic_curves import (
     PathSettings,
     measure_distance,
 )
-from ....hybrid.records import Probe, State, Status, Window
+from ....hybrid.records import Probe, Status, Window
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ....response.spectrum import make_acceleration_measures
@@ -58,9 +58,6 @@ MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 MAX_BRACKET_STEPS = (
     8  # steps, each twice as long as the one before, beyond which no maximum is looked for
 )
-harmonic_balance.N_FIRST_CYCLES = (
-    3  # cycles before the first correction of a motion that starts from the first-harmonic balance
-)
 # Relative distance from its friction limit at which an interface slips as a whole
 FULL_SLIP_TOL = 1e-9
 # Steps along a response curve over frequency
@@ -89,12 +86,12 @@ class ShootingFinder:
         self.may_fold = may_fold(model)
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
         laws = [law for law, _ in self.joints.laws]
-        self.odd_laws = ()
-        if all(law.law == "masing" for law in laws) and not model.rig.springs.is_nonlinear:
-            self.odd_laws = laws
-        is_smooth = any(masing.has_power_law(law) for law in laws)
-        is_smooth &= all(law.law == "masing" for law in laws)
-        self.follows_curve = self.may_fold or (is_smooth and self._max_growth_rate < 0)
+        have_elements = all(law.law == "masing" for law in laws)
+        self.odd_laws = laws if have_elements and not model.rig.springs.is_nonlinear else ()
+        is_smooth = have_elements and any(masing.has_power_law(law) for law in laws)
+        self.follows_curve = self.may_fold or (
+            self.draws_curve and is_smooth and self._max_growth_rate < 0
+        )
         self.evaluator = LumpedEvaluator(model, self.numerics, patch, self.joints)
 
     def make_case(self, drive) -> cases.Case:
@@ -112,8 +109,8 @@ class ShootingFinder:
         ----------
         drive : SineDrive
             Amplitude [m s-2] and angular frequency [rad/s].
-        guess : PeriodicMotion, optional
-            Similar motion.
+        guess : PeriodicMotion or State, optional
+            Similar motion, or its state.
         needs_stability : bool
             Whether multipliers and errors are needed. Without them a change over a period of MAX_KINKED_CHANGE counts as
             none, and a motion that is found from a guess takes a few periods.
@@ -126,14 +123,10 @@ class ShootingFinder:
         # A damped motion whose stability does not matter follows from its guess in a few periods; any other is searched.
         case = self.make_case(drive)
         is_undamped = self._max_growth_rate * drive.period > -periodic.UNDAMPED_TOL
-        if isinstance(guess, State):
-            motion = periodic.find_periodic_motion(
-                case, start=guess, n_first=harmonic_balance.N_FIRST_CYCLES, odd_laws=self.odd_laws
-            )
-        elif guess is None or needs_stability or is_undamped:
+        if guess is None or needs_stability or is_undamped:
             motion = periodic.find_periodic_motion(
                 case,
-                start=guess and guess.run.final,
+                start=guess.run.final if isinstance(guess, periodic.PeriodicMotion) else guess,
                 n_first=periodic.N_FIRST_CYCLES if guess is None else 1,
                 has_kinks=self.joints.has_kinks,
                 is_undamped=is_undamped,
@@ -462,7 +455,7 @@ class ShootingFinder:
         return float(np.linalg.eigvals(state).real.max())
 
     def trace_curve(self, drive) -> ResponseCurve:
-        """Compute the response curve over frequency, by continuation if it may have folds or if the law is Iwan's.
+        """Compute the response curve over frequency, by continuation if it may have folds or if that of Iwan's law is drawn.
 
         Other curves start with N_SWEEP_POINTS frequencies and the natural frequencies. Each point starts from the motion at
         the previous one. The curve is refined until linear interpolation has an error of at most INTERPOLATION_TOL.
@@ -501,7 +494,7 @@ class ShootingFinder:
             Its amplitude and its range of frequencies.
         """
         laws = self.odd_laws
-        if not laws or self.joints.has_kinks or self._max_growth_rate >= 0:
+        if not laws or self._max_growth_rate >= 0:
             return []
         omega = 2 * np.pi * np.sort(choose_start_frequencies(self.modes, drive))
         balanced = harmonic_balance.balance_first_harmonic(
@@ -519,8 +512,7 @@ class ShootingFinder:
             if heights[k] < harmonic_balance.MIN_HEIGHT_RATIO * highest:
                 break
             sine = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
-            start = balanced.make_start(self.make_case(sine), k)
-            top = self.compute_curve_point(sine, start, needs_stability=False)
+            top = self._compute_balanced_point(sine, balanced)
             points.append(top)
 
             # Outwards from the estimate, in steps of twice the length, until the amplitude falls on both sides
@@ -531,15 +523,18 @@ class ShootingFinder:
                 )
                 while last.drive.omega != end:
                     place = float(np.clip(last.drive.omega + step, omega[0], omega[-1]))
-                    point = self.compute_curve_point(
-                        replace(sine, omega=place), last.guess, needs_stability=False
-                    )
+                    point = self._compute_balanced_point(replace(sine, omega=place), balanced)
                     points.append(point)
                     if point.values[AMPLITUDE] < last.values[AMPLITUDE]:
                         break
                     last = point
                     step *= 2
         return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
+
+    def _compute_balanced_point(self, drive, balanced) -> CurvePoint:
+        """Return the curve point of a drive, found from `BalancedMotions` beside its frequency."""
+        start = balanced.make_start(self.make_case(drive))
+        return self.compute_curve_point(drive, start, needs_stability=False)
 
     def _follow_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation along its arc length, through its folds."""
