@@ -46,7 +46,7 @@ PHASE_MEASURES = select_names("phase")  # Angles modulo pi.
 DIFFERENCE_ROUND_OFF = 1e-13
 
 
-def compute_signed_changes(fine: Values, coarse: Values) -> Values:
+def compute_changes(fine: Values, coarse: Values) -> Values:
     """Return the difference of each measure, fine minus coarse; that of phases is reduced modulo pi."""
     changes = {name: fine[name] - coarse[name] for name in fine if name in coarse}
     for name in PHASE_MEASURES:
@@ -57,9 +57,7 @@ def compute_signed_changes(fine: Values, coarse: Values) -> Values:
 
 def compute_absolute_changes(fine: Values, coarse: Values) -> Values:
     """Return the absolute difference of each measure between two runs; phases are modulo pi."""
-    return {
-        name: abs(difference) for name, difference in compute_signed_changes(fine, coarse).items()
-    }
+    return {name: abs(change) for name, change in compute_changes(fine, coarse).items()}
 
 
 def estimate_convergence_errors(
@@ -87,7 +85,7 @@ def estimate_convergence_errors(
     dict
         Errors by name, for the measures of the two finest runs.
     """
-    changes = [compute_signed_changes(*pair) for pair in pairwise(values)]
+    changes = [compute_changes(*pair) for pair in pairwise(values)]
     errors = {}
     for name in changes[0]:
         known = [change[name] for change in changes if name in change]

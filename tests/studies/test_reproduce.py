@@ -16,16 +16,15 @@ def find_stale_rows(study, part: str) -> list[str]:
     return [line for line in lines if tuple(line.split(" | ")[:4]) not in kept]
 
 
-@pytest.mark.parametrize("part", ["block", "figure-13"])
+LONG_PARTS = ("table-1", "onset", "conclusions")
+
+
+@pytest.mark.parametrize(
+    "part",
+    ["block", "figure-13", *(pytest.param(part, marks=pytest.mark.slow) for part in LONG_PARTS)],
+)
 def test_exact_page_has_the_computed_numbers(study, part):
-    """Printed and computed values of the block and of a figure are those of the page."""
-    assert find_stale_rows(study, part) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("part", ["table-1", "onset", "conclusions"])
-def test_exact_page_has_all_computed_numbers(study, part):
-    """Printed and computed values of Table 1, onsets and conclusions are those of the page."""
+    """Printed and computed values of the block, a figure, Table 1, onsets and conclusions are those of the page."""
     assert find_stale_rows(study, part) == []
 
 

@@ -503,6 +503,12 @@ class ShootingFinder:
         gauge = self.modes.output if self.modes.gauge is None else self.modes.gauge
         heights = np.abs(balanced.modes @ gauge)
 
+        def find_point(place) -> CurvePoint:
+            """Return the curve point at a circular frequency [rad/s], from the balance there."""
+            sine = SineDrive(drive.acceleration, float(place), drive.moving)
+            start = balanced.make_start(self.make_case(sine))
+            return self.compute_curve_point(sine, start, needs_stability=False)
+
         # The highest maxima come first, and end where none is high enough beside the motions that were found.
         padded = np.pad(heights, 1)
         maxima = np.flatnonzero((heights >= padded[:-2]) & (heights >= padded[2:]))
@@ -511,8 +517,7 @@ class ShootingFinder:
             highest = max((point.values[AMPLITUDE] for point in points), default=0.0)
             if heights[k] < harmonic_balance.MIN_HEIGHT_RATIO * highest:
                 break
-            sine = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
-            top = self._compute_balanced_point(sine, balanced)
+            top = find_point(omega[k])
             points.append(top)
 
             # Outwards from the estimate, in steps of twice the length, until the amplitude falls on both sides
@@ -522,19 +527,14 @@ class ShootingFinder:
                     heights[k::direction], np.abs(omega[k::direction] - omega[k])
                 )
                 while last.drive.omega != end:
-                    place = float(np.clip(last.drive.omega + step, omega[0], omega[-1]))
-                    point = self._compute_balanced_point(replace(sine, omega=place), balanced)
+                    place = np.clip(last.drive.omega + step, omega[0], omega[-1])
+                    point = find_point(place)
                     points.append(point)
                     if point.values[AMPLITUDE] < last.values[AMPLITUDE]:
                         break
                     last = point
                     step *= 2
         return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
-
-    def _compute_balanced_point(self, drive, balanced) -> CurvePoint:
-        """Return the curve point of a drive, found from `BalancedMotions` beside its frequency."""
-        start = balanced.make_start(self.make_case(drive))
-        return self.compute_curve_point(drive, start, needs_stability=False)
 
     def _follow_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation along its arc length, through its folds."""
