@@ -131,7 +131,8 @@ class OpenCases(NamedTuple):
 def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
     """Compute the static measures of all cases of a group, with errors within the tolerance if possible.
 
-    A case that cannot be solved, or misses the tolerance, has a reason (`cases.Reason`); it never stops the others.
+    A case that cannot be solved has an error (`Batch.messages`); one that misses the tolerance has its best values and an
+    excess above 1. Neither stops the others.
 
     Parameters
     ----------
