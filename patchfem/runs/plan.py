@@ -259,9 +259,10 @@ def _interface_stiffnesses(model: Model) -> "of_rig.Chain":
         stiffnesses["grooves"] = model.grooves.stiffness(load)
     stiffnesses["bonds"] = _law_stiffness(model.friction, load)
     others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
-    for number, interface in enumerate(others, 2):
+    for number, interface in enumerate(others, 1):
         interface_load = load if interface.load is None else interface.load
-        stiffnesses[f"bonds_{number}"] = _law_stiffness(interface.numbers, interface_load)
+        name = add_interface_number("bonds", number)
+        stiffnesses[name] = _law_stiffness(interface.numbers, interface_load)
     return stiffnesses
 
 

@@ -28,9 +28,8 @@ from .values import contact_reaches_steep_end, find_contact_edges
 # Largest number of contacts for which the meshes of many cases are graded: half of them equally spaced in the order of
 # their left ends, half in that of their right ends
 MAX_GRADED_CONTACTS = 48
-MAX_SEARCHED_CASES = (
-    256  # largest number of cases whose contacts are searched for before the meshes are chosen
-)
+# Largest number of cases whose contacts are searched for before the meshes are chosen
+MAX_SEARCHED_CASES = 256
 # Largest number of interface nodes of meshes that many cases share; a finer mesh slows down every case
 MAX_SHARED_NODES = 500
 MAX_CHUNK_VALUES = 4_000_000  # numbers of a temporary array of cases, columns and nodes, 32 MB

@@ -334,7 +334,7 @@ class LumpedEvaluator(RunEvaluator):
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return the measures of the engine.
 
-        Strips that slide independently are parts of a single interface, whose loop of the mean displacement is that of
+        Bands that slide independently are parts of a single interface, whose loop of the mean displacement is that of
         samples.
 
         Parameters

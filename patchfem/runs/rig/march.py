@@ -9,7 +9,7 @@ from time import process_time
 
 import numpy as np
 
-from ...core import Outcome
+from ...core import Outcome, add_interface_number
 from ...effects import law_has_trait
 from ...response.loops import CycleLoop
 from ...response.measures import Values, bound_sampling_errors, compute_step_harmonic
@@ -149,8 +149,8 @@ class MarchEvaluator(RunEvaluator):
             size = np.max(np.abs(window.modal) @ np.abs(point_set.row))
             rests = np.abs(np.diff(slide)) <= MAX_HELD_MOVE * size
             if self.contact.is_rigid(point_set) and (rests[:-1] > rests[1:]).any():
-                number = f"_{k + 1}" if k else ""
-                peaks[f"friction_force_peak{number}"] = float(point_set.law.limits.sum())
+                name = add_interface_number("friction_force_peak", k)
+                peaks[name] = float(point_set.law.limits.sum())
         return peaks
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
