@@ -235,7 +235,7 @@ class _CaseSolver:
             n_done = len(done.series)
             if not is_automatic:
                 return Verdict(np.inf, given[n_done - 1] if n_done <= len(given) else None)
-            finer = [body.refine() for body in done.series[-1].pair.meshes if body is not None]
+            finer = grids.halve_cells(done.series[-1].pair.meshes)
             is_last = finer[0].x.size > max_nodes
             is_last |= mesh_levels.is_too_expensive(self.patch_model, finer)
             is_judged = n_done > n_unjudged
