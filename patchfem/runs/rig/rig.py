@@ -35,7 +35,6 @@ from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, 
 from . import bond_lists, comparisons, decays, event_to_event, flutter, march, slides
 from . import fields as interface_fields
 from .engines import (
-    BENCH,
     ENGINES,
     HYBRID,
     MARCH,
@@ -43,6 +42,7 @@ from .engines import (
     MIN_RELATIVE_STEP_ERROR,
     Numerics,
     choose_numerics,
+    make_bench_numerics,
 )
 from .evaluation import (
     Solution,
@@ -398,7 +398,7 @@ def estimate_slide_errors(model, patches, run: "bench.BenchRun", steps: int) -> 
         Source of the error, and errors by measure.
     """
     solution = slides.make_slide_solution(run)
-    numerics = Numerics(BENCH.name, steps, model.slide.cycles, 1, None, run.engine.choice)
+    numerics = make_bench_numerics(model, steps, run.engine)
     runs = comparisons.list_time_runs(numerics)
     runs += comparisons.list_space_runs(model, numerics, patches[0], len(patches) - 1, solution)
     return Runner(model, patches).estimate_errors(runs, solution)
