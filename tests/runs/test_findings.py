@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from scene_runs import find_sentences
-from scene_texts import BENCH, BLOCK, COULOMB, POINT, SHEAR, SHORT, SLIDE
+from scene_texts import BENCH, BLOCK, COULOMB, DRIVE, MODE, POINT, SHEAR, SHORT, SLIDE
 
 from patchfem import run
 from patchfem.runs.results.result import shorten_file_names
@@ -15,6 +15,8 @@ from patchfem.runs.results.result import shorten_file_names
 LOOSE = "[accuracy]\ntolerance = 0.01\n"
 BONDS = POINT + '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\norder = 2\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "2 um"\nfrequency = "1 Hz"\ncycles = 2\n'
+BENCH_END = SLIDE + "cycles = 1\n"
+RIG_END = MODE + DRIVE
 MARCH = {"accuracy.method": "march", "accuracy.steps_per_cycle": 40}
 
 # Scene, keys that cause the finding, and key and axis of its advice. Without these keys nothing misses the tolerance.
@@ -51,11 +53,20 @@ def test_advice_of_a_finding_is_a_record(name):
     assert not accurate.findings and not misses_tolerance(accurate)
 
 
-@pytest.mark.parametrize("shear, count", [("", 1), (SHEAR, 0)])
-def test_exact_note_on_stiffness_of_pieces_that_are_rigid_in_shear(shear, count):
-    """Without [contact.shear] a note says that the motion does not use the tangential stiffness of the pieces."""
-    notes = run(BLOCK + LOOSE + shear + COULOMB + SLIDE + "cycles = 1\n").notes
-    assert len(find_sentences(notes, "rigid in shear without")) == count
+@pytest.mark.parametrize(
+    "scene, static, count",
+    [
+        (BENCH_END, 0.3, 1),
+        (SHEAR + BENCH_END, 0.3, 0),
+        (SHEAR + BENCH_END, 0, 0),
+        (SHEAR + RIG_END, 0, 0),
+    ],
+)
+def test_sentences_name_shear_only_where_a_scene_lacks_it(scene, static, count):
+    """A note on pieces that are rigid in shear names [contact.shear], but not without friction, nor if it is given."""
+    result = run(BLOCK + LOOSE + COULOMB + scene, **{"friction.static": static})
+    sentences = [*result.warnings, *result.notes]
+    assert len(find_sentences(sentences, "[contact.shear]")) == count
 
 
 @pytest.mark.parametrize("folder", ["/data/my rig/", "C:\\data\\my rig\\", "D:/data/rig/"])

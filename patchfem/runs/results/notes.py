@@ -219,7 +219,8 @@ def _note_on_groove_slope(run) -> Iterator[str]:
 def _note_on_rigid_pieces(run) -> Iterator[str]:
     """Note that the stiffness of the pieces has no effect on a motion that treats them as rigid in shear."""
     model = run.model
-    if run.patch is not None and model.friction is not None and not model.partial_slip:
+    has_friction = model.friction is not None and model.friction.static > 0
+    if run.patch is not None and has_friction and not model.partial_slip:
         yield (
             "tangential_stiffness is that of the pieces while the whole patch sticks; the motion does not use it, because "
             "pieces are rigid in shear without [contact.shear]"

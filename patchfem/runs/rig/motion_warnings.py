@@ -68,13 +68,15 @@ def _warn_of_single_points(run) -> list[str]:
 def _is_single_point(run, face: Face) -> bool:
     """Return whether an interface has the motion of a single point with the same load.
 
-    It does if its pieces are rigid in shear, its load is constant, and the pressure moves with the upper piece.
+    It does if its pieces are rigid in shear, its load is constant, and the pressure moves with the upper piece. Without
+    friction no shape matters.
     """
     model = run.model
     law = face.model.friction
     can_move = model.rig.friction.load_varies or model.rig.friction.bands_slide_apart
     is_flat = not (face.partial_slip or model.side == "lower" or can_move)
-    return is_flat and law is not None and not law_has_trait(law.law, "averaged")
+    has_friction = law is not None and law.static > 0
+    return is_flat and has_friction and not law_has_trait(law.law, "averaged")
 
 
 def _warn_of_engine(run) -> Iterator[str]:
