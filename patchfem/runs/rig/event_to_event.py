@@ -124,7 +124,7 @@ def run_from_event_to_event(
     begin = process_time()
     joints = make_joints(model, numerics, patch)
     prepare = {"reduce": process_time() - begin}
-    compiled.load_compiled_module("hybrid.engine_kernels", say)
+    compiled.report_compilation_to(say)
     return LumpedEvaluator(model, numerics, patch, joints).solve(n_frames, progress, prepare)
 
 

@@ -252,7 +252,7 @@ class CoupledRun:
         return settings._replace(shear_modes=size)
 
     def find_force_ratio(self) -> float:
-        """Return the largest ratio of friction force to mu_s N [1]; 0 under a load that varies."""
+        """Return the largest friction force, divided by the static limit mu_s N [1]; 0 if the load varies."""
         rig = self.model.rig
         varies = self.model.load_varies if rig is None else rig.friction.load_varies
         limit = 0.0

@@ -77,7 +77,7 @@ class ShootingFinder:
             numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
         )
         self.draws_curve = numerics.whole
-        compiled.load_compiled_module("hybrid.engine_kernels", say)
+        compiled.report_compilation_to(say)
         self.joints = make_joints(model, self.numerics, patch)
         self.may_fold = may_fold(model)
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
