@@ -181,7 +181,7 @@ class FreeShooting(ExtendedShooting):
     """Map of half a period of a free motion, whose further unknowns are frequency and rate.
 
     The rate is that of the negative damping, 2 zeta omega, or it multiplies the force. The map adds to the
-    frequency what the output misses of its phase, and to the rate what it misses of its amplitude.
+    frequency the residual of the phase of the output, and to the rate that of its amplitude.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ class FreeShooting(ExtendedShooting):
         )
 
     def find_conditions(self, before: State) -> np.ndarray:
-        """Return what frequency and rate miss: the phase of the fundamental of the output, and half of its range."""
+        """Return the residuals (2,) of the phase of the fundamental of the output and of its amplitude."""
         omega = before.y[self.extra[0]]
         cycle = self.record.cycles[0]
         size = max(cycle[Cycle.MAX], -cycle[Cycle.MIN])
@@ -231,7 +231,7 @@ class FreeShooting(ExtendedShooting):
         return np.array([omega * cosine / self.amplitude, gain])
 
     def find_excess(self, step, start) -> float:
-        """Return the largest ratio of a Newton step of frequency and rate to LONGEST_STEPS."""
+        """Return the larger one of the Newton steps of frequency and rate, relative to those of LONGEST_STEPS."""
         return float(np.abs(step[self.extra] / (LONGEST_STEPS * start[self.extra[0]])).max())
 
     def set_extra(self, values) -> None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...core import PatchfemError, compute_allowed_error
+from ...core import PatchfemError, compute_allowed_error, compute_error_ratio
 from ...formatting import format_length
 from ...mesh.grid import TensorGrid
 from ..results.patch_rows import (
@@ -147,10 +147,8 @@ class StaticEstimates(NamedTuple):
         Measures without value or error do not count. `tolerance` is relative, and `length` [m] that of the interface.
         """
         rows = [self.names.index(name) for name in MESH_MEASURES]
-        allowed = compute_allowed_error(tolerance, self.values, self.floors(tolerance, length))[
-            rows
-        ]
-        ratios = self.errors[rows] / np.maximum(allowed, 1e-300)
+        floors = self.floors(tolerance, length)[rows]
+        ratios = compute_error_ratio(tolerance, self.values[rows], self.errors[rows], floors)
         return np.nan_to_num(ratios).max(axis=0)
 
 

@@ -292,9 +292,9 @@ def _most_worn_coating(model, depth) -> WornCoating:
 class WornPiece(NamedTuple):
     """Part of the wear that one piece of a patch has.
 
-    - piece: the piece
-    - name: "upper" or "lower"
-    - depth: largest depth that is worn off it [m]
+    - piece: the piece.
+    - name: "upper" or "lower".
+    - depth: largest depth that is worn off it [m].
     """
 
     piece: PatchPiece

@@ -135,7 +135,7 @@ def bands_slide_independently(model) -> bool:
     return model.rig is not None and model.rig.friction.bands_slide_apart
 
 
-def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
+def compute_cycle_slip(model, patch, n_cycle_frames: int) -> CycleSlip:
     """Compute the slip path of the interface nodes in one periodic cycle of a model.
 
     Parameters
@@ -144,10 +144,10 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
         Model at the present wear.
     patch : Patch
         Patch at the present wear.
-    frames : int
+    n_cycle_frames : int
         Number of frames per cycle from which the path is computed, if the nodes do not slip alike.
     """
-    n_frames = 0 if slips_uniformly(model) else frames
+    n_frames = 0 if slips_uniformly(model) else n_cycle_frames
     if model.rig is None:
         n_frames *= max(1, round(model.slide.cycles or 1))
     settings = engines.choose_numerics(model)
