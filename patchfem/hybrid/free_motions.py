@@ -29,7 +29,7 @@ from .cases import MIN_STEPS, Case, Options, UndrivenRig, make_rig, make_start
 from .drives import make_tones
 from .laws import is_rigid
 from .measures import split_integrals
-from .periodic import MAX_STABLE_MULTIPLIER, copy_state
+from .periodic import MAX_STABLE_MULTIPLIER, MIN_STOP, copy_state
 from .periodic_curves import N_FIRST, ExtendedShooting
 from .quasi_static import find_static_motions
 from .records import (
@@ -62,7 +62,6 @@ FREE_RATIOS = (3.0, 10.0)
 STATIC_RATIOS = (1.0, 0.5, 2.0)  # the same for quasi-static motions
 STATIC_RTOL = 1e-6  # step tolerance of the friction loops of these motions
 N_SAMPLES = 64  # samples of a period for the shape of its motion
-MIN_STOP = 1e-9  # shortest rest of rigid friction that is seen, in periods
 
 # Amplitudes at which the damping of free motions is evaluated to bracket limit cycles, relative to that of den Hartog's
 # balance, and their number

@@ -65,6 +65,7 @@ MAX_NEWTON_STEPS = 20  # Newton steps to a motion from a similar one
 MAX_BROYDEN_RATIO = 0.3
 # Largest number of shortened Newton steps, and of Newton steps with new derivatives
 MAX_DETOURS = 3
+MIN_STOP = 1e-9  # shortest rest of rigid friction that is counted, in periods
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
 

@@ -53,7 +53,6 @@ N_CYCLES_IN_GROOVES = 30
 RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
-MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 # Relative distance from its friction limit at which an interface slips as a whole
 FULL_SLIP_TOL = 1e-9
 # Steps along a response curve over frequency
@@ -339,7 +338,7 @@ class ShootingFinder:
             return "slides" if laws else "no friction"
         if not any(is_rigid(law.law) for law in laws):
             return "sliding"
-        lasts = faces[:, Window.STUCK] > MIN_STOP * motion.period
+        lasts = faces[:, Window.STUCK] > periodic.MIN_STOP * motion.period
         n_stops = int((faces[:, Window.STARTS] * lasts).max())
         return f"{n_stops} stop{'s' * (n_stops != 1)}" if n_stops else "sliding"
 
