@@ -352,7 +352,7 @@ ADVICE_BY_AXIS: dict[str, Callable[[Missed], Advice | None]] = {
 # Largest difference of the integral of the pressure from the load, relative to the load; the contact solver reaches 1e-9.
 LOAD_BALANCE_TOL = 1e-6
 # Largest energy that is missing or was created in a bench, relative to the exchanged energy. All terms are integrated by
-# the same rule, so that this residual falls with the number of steps.
+# the same rule, so that this residual falls with the number of steps. A hundredth is the usual tolerance of a bench.
 MAX_BENCH_ENERGY_RESIDUAL = 0.01
 # The same in a run with equal time steps, where the residual is round-off; a billion steps have less.
 MAX_MARCH_ENERGY_RESIDUAL = 1e-8

@@ -124,7 +124,7 @@ class Contact:
 
     @property
     def first_sets(self) -> list[PointSet]:
-        """Sets of the first interface: one, or one for each band of a face whose bands deform the same pieces."""
+        """Point sets of the first interface: one set, or one for each band of a face that yaws with partial slip."""
         n_sets = 1
         while n_sets < len(self.point_sets) and self.point_sets[n_sets].shares_shear:
             n_sets += 1

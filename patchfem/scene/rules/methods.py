@@ -228,7 +228,7 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     for law in laws:
         joints.append(Joint(law, find_compliance_key(law, tables), _is_uneven(law, tables)))
 
-    # Shapes on the lower piece of the patch, or of the patches of interfaces
+    # The scene has one patch, or one for each interface, and any of them may have shapes on its lower piece.
     lower = list_lower_shapes(tables.contact)
     for number, interface in enumerate(scene.structure.interface):
         patch_key = f"structure.interface.{number}.contact"
