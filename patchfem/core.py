@@ -222,7 +222,7 @@ class ModalBasis:
         return self.slide[None, :] if self.faces is None else self.faces
 
     @property
-    def measured(self) -> np.ndarray:
+    def displacement_point(self) -> np.ndarray:
         """Participation (n,) of the point whose displacement is measured."""
         return self.output if self.gauge is None else self.gauge
 

@@ -224,7 +224,9 @@ def make_rig(
     table = np.zeros((len(Mode), n))
     damping = np.zeros((n, n))
     if modes is not None:
-        table = np.array([modes.omega**2, -modes.base, modes.output, modes.measured], float)
+        table = np.array(
+            [modes.omega**2, -modes.base, modes.output, modes.displacement_point], float
+        )
         damping = np.array(modes.damping_matrix, float, order="C")
 
     # Friction work, slip and loss of each interface.
