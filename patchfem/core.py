@@ -40,7 +40,6 @@ __all__ = [
     "SineDrive",
     "add_interface_number",
     "compute_allowed_error",
-    "compute_error_ratio",
     "frozen_array",
     "remove_interface_number",
 ]
@@ -375,7 +374,7 @@ class Measure:
         """
         if self.value is None or self.error is None:
             return 0.0
-        return float(compute_error_ratio(tolerance, self.value, self.error, self.floor))
+        return self.error / max(compute_allowed_error(tolerance, self.value, self.floor), 1e-300)
 
     def __str__(self) -> str:
         if self.value is None and self.reason:
@@ -404,21 +403,6 @@ def compute_allowed_error(tolerance, value, floor):
         Error in the unit of the value.
     """
     return tolerance * abs(value) + floor
-
-
-def compute_error_ratio(tolerance, value, error, floor):
-    """Return the ratio of an error to the error that a tolerance allows; above 1 the tolerance is missed.
-
-    Parameters
-    ----------
-    tolerance : float or array
-        Relative tolerance.
-    value, error, floor : float or array
-        Value of the measure, its error and its absolute floor, in one unit.
-    """
-    allowed = np.maximum(compute_allowed_error(tolerance, value, floor), 1e-300)
-    with np.errstate(over="ignore"):  # of a value of 0 without a floor
-        return error / allowed
 
 
 class MeasureDefinition(NamedTuple):

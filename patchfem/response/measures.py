@@ -176,7 +176,7 @@ def compute_ledger_measures(ledger) -> Values:
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 
 
-def compare_loop_work(work, loops, jumps: bool = False) -> float:
+def compare_loop_work(work, loops, jumps: bool) -> float:
     """Return the relative difference [1] between the friction work of the engine and int F dx over the samples.
 
     |sum of int F dx over all directions by the trapezoidal rule - work| / (sum over all steps of |change of work|). It

@@ -260,9 +260,9 @@ def _interface_stiffnesses(model: Model) -> "of_rig.Chain":
     stiffnesses["bonds"] = _law_stiffness(model.friction, load)
     others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
     for number, interface in enumerate(others, 1):
-        interface_load = load if interface.load is None else interface.load
         name = add_interface_number("bonds", number)
-        stiffnesses[name] = _law_stiffness(interface.numbers, interface_load)
+        own_load = of_rig.find_interface_load(model, interface)
+        stiffnesses[name] = _law_stiffness(interface.numbers, own_load)
     return stiffnesses
 
 

@@ -72,6 +72,7 @@ def test_exact_scene_is_pressed_with_both_surfaces(trace_pair, tmp_path):
     scene.write_text(f"[contact]\n{pieces}[accuracy]\ntolerance = 1e-2\n", "utf-8")
     out = tmp_path / "out"
     assert run_cli("compare", *trace_pair, "--scene", scene, "-o", out).code == 0
+    assert ".partial" not in (out / "compare.json").read_text("utf-8")
     pressed = read_json(out / "compare.json")["pressed"]["measures"]
     assert {"pressure_peak", "normal_stiffness", "approach"} <= pressed.keys()
     assert "Pressure on the interface" in read_page(out)

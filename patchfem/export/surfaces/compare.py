@@ -89,7 +89,7 @@ def compare_with_scene(
     run_surfaces : callable
         Receives the paths of both traces, limited to their common part, and runs the scene with each.
     folder : Path
-        Receives surface_before.csv and surface_after.csv.
+        Folder NAME.partial, later NAME, that receives surface_before.csv and surface_after.csv.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def compare_with_scene(
     """
     comparison = compare.compare_files(before, after, options)
     paths = pressing.write_common_traces(comparison, folder)
-    return _add_pressed(make_comparison_answer(comparison), run_surfaces(*paths))
+    return _add_pressed(make_comparison_answer(comparison), run_surfaces(*paths), folder)
 
 
 def make_comparison_answer(comparison: Comparison) -> Answer:
@@ -220,8 +220,11 @@ def _make_abbott(heights) -> Variables:
     )
 
 
-def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
-    """Add the measures and pressures of a scene that was run with the surface before and after wear."""
+def _add_pressed(answer: Answer, runs: SurfaceRuns, folder: Path) -> Answer:
+    """Add the measures and pressures of a scene that was run with the surface before and after wear.
+
+    `folder` has the traces. The messages of the runs then name it as it is called when the answer is complete.
+    """
     data = dict(answer.data)
     warnings = []
     notes = []
@@ -230,8 +233,8 @@ def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
         stress = result.fields["normal_stress"][0]
         columns = {f"x_pressed_{side}": x, f"pressure_{side}": stress}
         data |= make_variables("surface", **columns)
-        warnings += [f"{side}: {text}" for text in result.warnings]
-        notes += [f"{side}: {text}" for text in result.notes]
+        for listed, texts in ((warnings, result.warnings), (notes, result.notes)):
+            listed += [f"{side}: {text}".replace(folder.name, folder.stem) for text in texts]
 
     outcomes = {side: str(result.outcome) for side, result in runs.results.items()}
     sides = {side: make_quantities(result.measures) for side, result in runs.results.items()}

@@ -13,6 +13,7 @@ import numpy as np
 from ... import __version__
 from ...surface.compare.records import Comparison, Track
 from ...surface.quantity import CONFIDENCE_LEVEL, Quantity
+from ...surface.spectrum import WAVE_BAND
 from .. import answer, quantities
 from ..answer import JsonObject, Remarks, Variables
 from ..rows import make_variables
@@ -192,8 +193,10 @@ def describe_waves(ratio: Quantity | None) -> list[str]:
     elif ratio.low > 1 + RATIO_ROUND_OFF:
         change = "they are increased"
     text = format_value("amplitude_ratio", ratio)
+    shortest, longest = (1e6 * wave for wave in WAVE_BAND)
     return [
-        f"On the whole surface the waves from 60 to 110 um have {text} times their amplitude before wear: {change}."
+        f"On the whole surface the waves from {shortest:g} to {longest:g} um have {text} times their amplitude before "
+        f"wear: {change}."
     ]
 
 

@@ -10,7 +10,7 @@ from time import process_time
 
 import numpy as np
 
-from ...core import Measure, Outcome, compute_error_ratio
+from ...core import Measure, Outcome
 from ...model.model import Model
 from ...model.similar_models import SimilarModels
 from .. import findings
@@ -126,7 +126,7 @@ def _insert_findings(model: Model, batch: Batch, results: CaseResults) -> None:
     tolerance = model.accuracy.tolerance
     columns = (batch.values, batch.errors, batch.floors)
     table = np.array([[part[name] for name in names] for part in columns])
-    ratios = np.nan_to_num(compute_error_ratio(tolerance, *table))
+    ratios = measures.compute_error_ratios(tolerance, *table)
 
     is_missed = (ratios > 1).any(axis=0) & (batch.outcome != OutcomeCode.FAILED)
     for case in np.flatnonzero(is_missed).tolist():

@@ -221,7 +221,17 @@ def steps_per_cycle(model: Model) -> int:
 
 
 def make_bench_numerics(model: Model, steps: int, engine: "bench_engine.BenchEngine") -> Numerics:
-    """Return the Numerics of a bench from its steps per cycle and its method."""
+    """Return the Numerics of a bench.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the bench.
+    steps : int
+        Steps per cycle.
+    engine : BenchEngine
+        Method of the friction force.
+    """
     return Numerics(BENCH.name, steps, model.slide.cycles, 1, None, engine.choice)
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import surface
 from ...core import Measure, Outcome
 from ...response.outcome import judge_outcome
 from ...response.rows import AMPLITUDE
@@ -358,10 +359,8 @@ def _integrate_node_slip(model, patch, nodes: _Cycle) -> tuple[np.ndarray, float
         )
     error = points.estimate_reversal_error(sigma * patch.pieces.interface.weight)
     if model.patch.area is not None and patch.pressure.load > 0:
-        from ...surface.areal import fill_nearest
-
         known = np.where(sigma > 0, points.path, np.nan).reshape(patch.shape)
-        return fill_nearest(known).ravel(), error
+        return surface.areal.fill_nearest(known).ravel(), error
     return points.path[_find_nearest_contact(patch.x, sigma > 0)], error
 
 
