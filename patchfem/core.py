@@ -221,8 +221,8 @@ class ModalBasis:
         return self.slide[None, :] if self.faces is None else self.faces
 
     @property
-    def gauge_participation(self) -> np.ndarray:
-        """Participation (n,) of the modes in the displacement of the gauge, which is at the output unless given."""
+    def displacement_point(self) -> np.ndarray:
+        """Participation (n,) of the point whose displacement is measured."""
         return self.output if self.gauge is None else self.gauge
 
     @property

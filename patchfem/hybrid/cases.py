@@ -225,7 +225,7 @@ def make_rig(
     damping = np.zeros((n, n))
     if modes is not None:
         table = np.array(
-            [modes.omega**2, -modes.base, modes.output, modes.gauge_participation], float
+            [modes.omega**2, -modes.base, modes.output, modes.displacement_point], float
         )
         damping = np.array(modes.damping_matrix, float, order="C")
 

@@ -508,7 +508,8 @@ def observe_motion(piece, motion, output, seen):
     peak = find_peak(piece, (0.0, output, case[Number.BASE]), motion)
     seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
     # Forces of other laws have their extremes at the ends of pieces.
-    if numbers[LawNumber.LAW] == Law.TANH or numbers[LawNumber.LAW] == Law.LUGRE:
+    law = numbers[LawNumber.LAW]
+    if law == Law.TANH or law == Law.LUGRE:
         peak = find_peak(piece, (1.0, 0.0, 0.0), motion)
         seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], peak)
 

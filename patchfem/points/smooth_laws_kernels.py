@@ -81,13 +81,14 @@ def find_force(law, step, commits):
     """
     numbers = law.numbers
     memory = law.memory
-    if numbers[LawNumber.LAW] == Law.TANH:
+    kind = numbers[LawNumber.LAW]
+    if kind == Law.TANH:
         # tanh x = 1 - 2/(exp(2 x) + 1), in two thirds of the time and to the same fraction of the limit
         growth = exp(2 * step.end_velocity / numbers[LawNumber.SPEED])
         return numbers[LawNumber.LIMIT] * (1 - 2 / (growth + 1))
-    if numbers[LawNumber.LAW] == Law.LUGRE:
+    if kind == Law.LUGRE:
         return follow_bristles(law, step, commits)
-    if numbers[LawNumber.LAW] == Law.MASING:
+    if kind == Law.MASING:
         return follow_sliders(law, step.increment, commits)
 
     # Stretch along the motion relative to the length, and its mean square over the bonds
@@ -96,7 +97,7 @@ def find_force(law, step, commits):
     direction = 1.0 if step.increment > 0 else -1.0
     path = abs(step.increment) / length
     z = direction * memory[Memory.STRETCH] / length
-    if numbers[LawNumber.LAW] == Law.BONDS:
+    if kind == Law.BONDS:
         decay = exp(-path)
         end = 1 - (1 - z) * decay
         square = 2 + (memory[Memory.SQUARE] - 2 - 2 * (1 - z) * path) * decay

@@ -413,7 +413,7 @@ class ShootingFinder:
         """Return the point of a response curve of a linear rig in closed form, or None at an undamped resonance."""
         modes = self.modes
         try:
-            rows = [modes.gauge_participation, modes.output]
+            rows = [modes.displacement_point, modes.output]
             receptance = compute_receptance(modes, drive.omega, rows, modes.base)
         except PatchfemError:
             return None
@@ -487,7 +487,7 @@ class ShootingFinder:
         balanced = harmonic_balance.balance_first_harmonic(
             self.modes, laws, drive.acceleration, omega
         )
-        heights = np.abs(balanced.modes @ self.modes.gauge_participation)
+        heights = np.abs(balanced.modes @ self.modes.displacement_point)
 
         def find_point(place) -> CurvePoint:
             """Return the curve point at a circular frequency [rad/s], from the balance there."""
