@@ -221,6 +221,11 @@ class ModalBasis:
         return self.slide[None, :] if self.faces is None else self.faces
 
     @property
+    def measured(self) -> np.ndarray:
+        """Participation (n,) of the point whose displacement is measured."""
+        return self.output if self.gauge is None else self.gauge
+
+    @property
     def damping_matrix(self) -> np.ndarray:
         """Damping matrix D (n, n) [1/s]."""
         return np.diag(2 * self.zeta * self.omega) if self.damping is None else self.damping

@@ -1,6 +1,6 @@
 """Measures of a scene with its surface before and after wear.
 
-In: two models that differ only in their gap. Out: the measures of both runs with their errors (`SurfaceRuns`).
+In: two models that differ only in their gap. Out: the results of both runs (`SurfaceRuns`).
 """
 
 from collections.abc import Callable
@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Measure, NotConverged, PatchfemError
+from ..core import NotConverged, PatchfemError
 from ..disk.atomic_write import write_text
 from ..model.model import Model
 from ..runs.plan import plan
-from ..runs.results.result import Result, patch_surface
+from ..runs.results.result import Result
 from ..runs.run import run
 from ..surface.areal import level
 from ..surface.compare.records import Comparison
@@ -21,15 +21,6 @@ from ..surface.profile import Profile, resample_evenly
 
 # The two surfaces of a comparison, in names of files and results
 SURFACE_NAMES = ("before", "after")
-# Measures of a pressed patch that are compared for both surfaces
-COMPARED_MEASURES = (
-    "pressure_peak",
-    "contact_fraction",
-    "normal_stiffness",
-    "tangential_stiffness",
-    "onset_level",
-    "loop_area",
-)
 
 
 class SurfaceRuns(NamedTuple):
@@ -48,43 +39,6 @@ class SurfaceRuns(NamedTuple):
     title: str
     results: dict[str, Result]
     failed: tuple[str, ...]
-
-    def pressures(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Return the positions [m] and the normal stress [Pa] at the nodes, (n,) each, by side."""
-        pressures = {}
-        for side, result in self.results.items():
-            surface = patch_surface(result.patch, result.fields)
-            pressures[side] = np.array(surface.x), np.array(result.fields["normal_stress"][0])
-        return pressures
-
-    def as_dict(self) -> dict[str, object]:
-        """Return measures, outcomes, failures and warnings as a dict in SI units."""
-        measures = {}
-        for name in COMPARED_MEASURES:
-            by_side = {side: one.measures.get(name) for side, one in self.results.items()}
-            if any(one is not None and one.value is not None for one in by_side.values()):
-                measures[name] = {
-                    side: _measure_to_dict(by_side.get(side)) for side in SURFACE_NAMES
-                }
-        warnings = []
-        for side, result in self.results.items():
-            texts = [*result.warnings, *result.notes]
-            warnings += [f"{side}: {text}" for text in texts]
-        outcomes = {side: str(one.outcome) for side, one in self.results.items()}
-        return {
-            "scene": self.title,
-            "measures": measures,
-            "failed": list(self.failed),
-            "outcome": dict.fromkeys(SURFACE_NAMES) | outcomes,
-            "warnings": warnings,
-        }
-
-
-def _measure_to_dict(measure: Measure | None) -> dict | None:
-    """Return {"value", "error", "unit"} of a measure; None if there is no measure."""
-    if measure is None:
-        return None
-    return {"value": measure.value, "error": measure.error, "unit": measure.unit}
 
 
 def run_both_surfaces(

@@ -88,14 +88,32 @@ def find_order(sizes: np.ndarray, values: np.ndarray) -> float | None:
 def find_sufficient_run(
     runs: list[Cost], name: str, convergence: Convergence, tolerance: float
 ) -> Cost | None:
-    """Return the coarsest run from which on a measure is accurate to a relative tolerance; None if there is none.
+    """Return the coarsest run from which on a measure is accurate to a relative tolerance.
 
-    Stated error and difference from the finest run must both lie within the tolerance, in this run and in finer ones.
+    Stated error and difference from the finest run must both lie within the tolerance, in this run and in finer ones. A
+    run without a stated error does not count as accurate.
+
+    Parameters
+    ----------
+    runs : list of Cost
+        Runs with rising accuracy; one with a setting by the tolerance does not count.
+    name : str
+        Name of the measure.
+    convergence : Convergence
+        That of the measure in these runs.
+    tolerance : float
+        Largest error and difference, relative to the value.
+
+    Returns
+    -------
+    Cost or None
+        None if no run is accurate enough.
     """
     fixed = [run for run in runs if run.value is not None]
     found = None
     for run, change in zip(reversed(fixed), reversed(convergence.changes), strict=True):
-        if max(change / tolerance, run.measures[name].error_ratio(tolerance)) > 1:
+        is_accurate = max(change / tolerance, run.measures[name].error_ratio(tolerance)) <= 1
+        if not (is_accurate and run.has_error(name)):
             break
         found = run
     return found

@@ -78,7 +78,8 @@ def compare(
     """
     length = parse_quantity(shift, "length", "compare --shift")
     options = Options(parse_units(units), direction, length, datum, keep_spikes)
-    other_options = {"--scene": scene, "--predicted": predicted, "--piece": piece}
+    trace_options = {"--predicted": predicted, "--piece": piece}
+    other_options = {"--scene": scene, "--set": set_, **trace_options}
     files = [path for path in (before, after, *other) if path is not None]
 
     # an option that the kind of comparison does not use is a mistake of the user
@@ -95,13 +96,15 @@ def compare(
 
     output = output_options.into(f"{before.resolve().stem}-{after.resolve().stem}")
     if before.is_dir() or after.is_dir():
-        set_options = {"--set": set_, "--units": units, "--shift": shift, "--datum": datum}
-        set_options |= {"--direction": direction, "--keep-spikes": keep_spikes}
-        _refuse_others({**set_options, **other_options}, "results folders")
+        other_options |= {"--units": units, "--shift": shift, "--datum": datum}
+        other_options |= {"--direction": direction, "--keep-spikes": keep_spikes}
+        _refuse_others(other_options, "results folders")
         save(lambda _: worn.answer_runs(before, after), output)
     elif scene is not None:
+        _refuse_others(trace_options, "--scene")
         _compare_in_scene(before, after, options, (scene, set_), output)
     else:
+        _refuse_others({"--set": set_}, "surfaces alone, without --scene")
         save(lambda _: compared.answer_files(before, after, options, predicted, piece), output)
 
 

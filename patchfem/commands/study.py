@@ -33,7 +33,7 @@ def cost(
     /,
     *,
     over: text_option(
-        "vary only one setting, where the scene uses it: element_size, steps_per_cycle, shear_modes or jumps; also with its "
+        f"vary only one setting, where the scene uses it: {', '.join(numerical_settings.NUMERICAL_SETTINGS)}; also with its "
         "table, such as contact.element_size"
     ) = "",
     set_: Sets = (),

@@ -71,7 +71,7 @@ UNCACHED_FUNCTIONS = set()
 # Lock that lets one thread at a time load code, because loading a function twice at the
 # same time crashes the process.
 CODE_LOADING_LOCK = RLock()
-REPORT = [None]  # callback of the last run, which receives a message if numba compiles a function
+REPORT = [None]  # callback of the last run, see `report_compilation_to`
 
 
 def hash_kernels() -> str:
@@ -297,18 +297,17 @@ class KernelFunction:
 _KERNEL_MODULES = {}  # `KernelModule` by its name without that of the package
 
 
-def load_compiled_module(module: str, report=None) -> KernelModule:
-    """Return a kernel module of the package without importing it.
-
-    Parameters
-    ----------
-    module : str
-        Name of the module without that of the package, such as "time_steps.march_kernels".
-    report : callable or None
-        Callback that receives a message, once per process, if numba compiles a function.
-    """
+def report_compilation_to(report) -> None:
+    """Set the function that receives a message, once per process, if numba compiles a function; None keeps the last one."""
     if report is not None:
         REPORT[0] = report
+
+
+def load_compiled_module(module: str) -> KernelModule:
+    """Return a kernel module of the package, which is imported when numba must compile one of its functions.
+
+    `module` is its name without that of the package, such as "time_steps.march_kernels".
+    """
     if module not in _KERNEL_MODULES:
         name = f"patchfem.{module}"
         text = _find_source(module).read_text("utf-8")
@@ -321,9 +320,7 @@ def _find_source(module: str) -> Path:
     return PACKAGE_FOLDER.joinpath(*module.split(".")).with_suffix(".py")
 
 
-def instantiate(
-    module: str, replacements: dict[str, str | KernelModule], report=None
-) -> KernelModule:
+def instantiate(module: str, replacements: dict[str, str | KernelModule]) -> KernelModule:
     """Return a kernel module in which other modules replace some of its imports.
 
     The source differs from the file in these imports only, so the line numbers of tracebacks are those of the file.
@@ -335,8 +332,6 @@ def instantiate(
     replacements : dict
         Name under which the module imports another one (`from . import other as name`) -> the module that replaces it,
         or its name without that of the package. It must have the same functions.
-    report : callable or None
-        Callback that receives a message, once per process, if numba compiles a function.
 
     Returns
     -------
@@ -347,8 +342,6 @@ def instantiate(
     ValueError
         If the module does not import another one exactly once under one of these names.
     """
-    if report is not None:
-        REPORT[0] = report
     names = []
     for alias, replacement in replacements.items():
         names.append((alias, getattr(replacement, "__name__", f"patchfem.{replacement}")))

@@ -8,10 +8,3 @@ FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 NJIT_KERNEL = {"error_model": "numpy", "fastmath": FASTMATH_FLAGS, **NJIT_NO_REFCOUNT}
 # The same options for a kernel that stays a call in callers that are inlined themselves
 NJIT_CALL = NJIT_KERNEL | {"forceinline": False}
-
-__all__ = [
-    "FASTMATH_FLAGS",
-    "NJIT_CALL",
-    "NJIT_KERNEL",
-    "NJIT_NO_REFCOUNT",
-]

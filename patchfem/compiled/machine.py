@@ -1,8 +1,8 @@
 """Files of machine code that run without importing numba.
 
-Numba takes half a second before it can load a function from its cache, because it imports its whole compiler. So the
-machine code of a function is stored a second time, together with an entry function that reads the arguments from a
-buffer of 8-byte words (status, results, then arguments as numba flattens them). `load_file` loads this file by llvmlite.
+Numba takes half a second to be imported, before it can load a function from a cache of its own. So the machine code of a
+function is stored here, together with an entry function that reads the arguments from a buffer of 8-byte words (status,
+results, then arguments as numba flattens them). `load_file` loads this file by llvmlite.
 
 This is possible for functions of floats, integers, arrays and tuples of these that call only the C library; numba compiles
 others in every process. A file consists of one line of JSON and an object file.
@@ -55,7 +55,9 @@ def convert_argument(value) -> tuple[str, bytes]:
     if isinstance(value, np.ndarray):
         return _convert_array(value)
     if not isinstance(value, tuple):
-        raise UnsupportedError
+        raise UnsupportedError(
+            f"compiled code takes no argument of the type {type(value).__name__}"
+        )
 
     # The tuple itself is kept too, so that no other object gets its `id`.
     known = _KNOWN_TUPLES.get(id(value))
@@ -79,9 +81,8 @@ def _convert_array(array) -> tuple[str, bytes]:
 def _name_array_type(dtype: np.dtype, n_dimensions: int, flags: int) -> str:
     """Return the type code of arrays with a type, a number of dimensions and flags (`numpy.ndarray.flags.num`)."""
     if flags & C_ORDER:
-        flags &= (
-            ~FORTRAN_ORDER
-        )  # numba too reads an array of both orders, such as a row, as one of C order
+        # Numba too reads an array of both orders, such as a row, as one of C order.
+        flags &= ~FORTRAN_ORDER
     return f"{dtype.str}{n_dimensions}-{flags & NUMBA_FLAGS}"
 
 
@@ -251,7 +252,7 @@ def compile_for_this_cpu(path: Path, portable: bytes) -> LoadedFunction | None:
 
     # The code is optimised already, but without the vector instructions of a CPU.
     if header["is_vectorised"]:
-        builder = create_pass_builder(target_machine, level=3, is_vectorised=True)
+        builder = create_pass_builder(target_machine, is_vectorised=True)
         builder.getModulePassManager().run(module, builder)
 
     # What is declared but not defined here must be found in the C library when the code is loaded.
@@ -326,7 +327,7 @@ def _write_portable_code(target, result, header: dict[str, object]) -> str:
             symbol.linkage = "internal"
 
     # Levels 2 and 3 give engines of the same speed, and vector instructions belong to a CPU.
-    builder = create_pass_builder(create_target_machine(), level=1)
+    builder = create_pass_builder(create_target_machine())
     builder.getModulePassManager().run(linked, builder)
     passes = binding.create_new_module_pass_manager()
     passes.add_strip_symbols_pass()
@@ -355,18 +356,17 @@ def _find_cpu(binding) -> tuple[str, str]:
         return "", ""
 
 
-def create_pass_builder(target_machine, *, level: int = 1, is_vectorised: bool = False):
-    """Return the builder of the optimisation passes of LLVM.
+def create_pass_builder(target_machine, *, is_vectorised: bool = False):
+    """Return the builder of the optimisation passes of LLVM, of level 1 for any CPU and of level 3 for this one.
 
     Parameters
     ----------
     target_machine
         Machine of LLVM for which the passes optimise.
-    level : int
-        Optimisation level, 1 to 3.
     is_vectorised : bool
-        Whether loops may become vector instructions.
+        Whether loops may become vector instructions, which belong to a CPU.
     """
+    level = 3 if is_vectorised else 1
     options = _import_binding().create_pipeline_tuning_options(speed_level=level)
     options.loop_vectorization = options.slp_vectorization = is_vectorised
     return _import_binding().create_pass_builder(target_machine, options)

@@ -35,7 +35,7 @@ def lock_file(file: int) -> bool:
             msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
     except (BlockingIOError, PermissionError):
         return False
-    except (ImportError, OSError):  # a disk that supports no locks
+    except (ImportError, OSError):  # a disk or a system without locks
         pass
     finally:
         os.lseek(file, 0, os.SEEK_SET)

@@ -136,7 +136,7 @@ def _make_quantities(backbone: Backbone) -> Quantities:
             out[f"{name}_at_smallest_amplitude"] = _make_point_quantity(curve, name, 0)
             out[f"{name}_at_largest_amplitude"] = _make_point_quantity(curve, name, -1)
         out["largest_damping"] = _make_point_quantity(curve, "damping", largest)
-        # the peak lies between the neighbours of the point; at an end of the curve nothing encloses it
+        # the peak of the damping lies between the neighbouring amplitudes; at an end of the curve its interval is unknown
         near = curve.amplitude[max(largest - 1, 0) : largest + 2]
         ends = near[[0, -1]] if near.size == 3 else (None, None)
         amplitude = Quantity(curve.amplitude[largest], "m", None, *ends)

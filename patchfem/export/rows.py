@@ -31,8 +31,8 @@ class Chart:
     style : str
         "line", "points", "area", "map" (colours over x and the first dimension), "face" (a map of the last frame over x and
         y), "overlay" (a line for each element of the first dimension) or "film" (a map with a slider). Of a sweep:
-        "relative" (measures divided by their first value), "menu" (one measure at a time) or "maps" (the same over two
-        keys).
+        "relative" (the main measures and those of `y`, divided by their first value), "menu" (one measure at a time) or
+        "maps" (the same over two keys).
     span : str
         "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str

@@ -15,9 +15,10 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from .. import __version__
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_text
-from .answer import RUN_KINDS, Answer, JsonObject, Quantity, Remarks, Variable
+from .answer import RUN_KINDS, Answer, JsonObject, Quantity, Remarks
 from .columns import format_curves
 from .netcdf import read_netcdf, write_netcdf
+from .rows import make_variables
 
 SUMMARY_FILE = "summary.json"
 SCENE_FILE = "scene.resolved.toml"
@@ -133,9 +134,7 @@ def read_answer(folder: Path) -> Answer:
         data = read_netcdf(path)[0] if has_arrays else {}
         if CPU_TIMES_VARIABLE in details:
             times = np.array(details[CPU_TIMES_VARIABLE], float)
-            data[CPU_TIMES_VARIABLE] = Variable(
-                ("accuracy_run",), times, "s", "CPU time of the motion"
-            )
+            data |= make_variables("run", **{CPU_TIMES_VARIABLE: times})
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
         raise PatchfemError(f"{folder}: a file of this folder is damaged: {error}") from None
 

@@ -224,8 +224,7 @@ def make_rig(
     table = np.zeros((len(Mode), n))
     damping = np.zeros((n, n))
     if modes is not None:
-        gauge = modes.output if modes.gauge is None else modes.gauge
-        table = np.array([modes.omega**2, -modes.base, modes.output, gauge], float)
+        table = np.array([modes.omega**2, -modes.base, modes.output, modes.measured], float)
         damping = np.array(modes.damping_matrix, float, order="C")
 
     # Friction work, slip and loss of each interface.

@@ -29,7 +29,7 @@ from .cases import MIN_STEPS, Case, Options, UndrivenRig, make_rig, make_start
 from .drives import make_tones
 from .laws import is_rigid
 from .measures import split_integrals
-from .periodic import MAX_STABLE_MULTIPLIER, copy_state
+from .periodic import MAX_STABLE_MULTIPLIER, MIN_STOP, copy_state
 from .periodic_curves import N_FIRST, ExtendedShooting
 from .quasi_static import find_static_motions
 from .records import (
@@ -62,7 +62,6 @@ FREE_RATIOS = (3.0, 10.0)
 STATIC_RATIOS = (1.0, 0.5, 2.0)  # the same for quasi-static motions
 STATIC_RTOL = 1e-6  # step tolerance of the friction loops of these motions
 N_SAMPLES = 64  # samples of a period for the shape of its motion
-MIN_STOP = 1e-9  # shortest rest of rigid friction that is seen, in periods
 
 # Amplitudes at which the damping of free motions is evaluated to bracket limit cycles, relative to that of den Hartog's
 # balance, and their number
@@ -181,7 +180,7 @@ class FreeShooting(ExtendedShooting):
     """Map of half a period of a free motion, whose further unknowns are frequency and rate.
 
     The rate is that of the negative damping, 2 zeta omega, or it multiplies the force. The map adds to the
-    frequency what the output misses of its phase, and to the rate what it misses of its amplitude.
+    frequency the residual of the phase of the output, and to the rate that of its amplitude.
 
     Parameters
     ----------
@@ -222,7 +221,7 @@ class FreeShooting(ExtendedShooting):
         )
 
     def find_conditions(self, before: State) -> np.ndarray:
-        """Return what frequency and rate miss: the phase of the fundamental of the output, and half of its range."""
+        """Return the residuals (2,) of the phase of the fundamental of the output and of its amplitude."""
         omega = before.y[self.extra[0]]
         cycle = self.record.cycles[0]
         size = max(cycle[Cycle.MAX], -cycle[Cycle.MIN])
@@ -231,7 +230,7 @@ class FreeShooting(ExtendedShooting):
         return np.array([omega * cosine / self.amplitude, gain])
 
     def find_excess(self, step, start) -> float:
-        """Return the largest ratio of a Newton step of frequency and rate to LONGEST_STEPS."""
+        """Return the larger one of the Newton steps of frequency and rate, relative to those of LONGEST_STEPS."""
         return float(np.abs(step[self.extra] / (LONGEST_STEPS * start[self.extra[0]])).max())
 
     def set_extra(self, values) -> None:

@@ -21,7 +21,7 @@ N_SUBSTITUTIONS = 60  # substitutions of the stiffness, each by half of its chan
 # Height of a maximum of the first-harmonic balance that is examined, relative to the highest steady motion. For the damper
 # of the template the balance exceeds it by up to 70 %, and falls short of it by 7 %.
 MIN_HEIGHT_RATIO = 0.5
-MAX_CHANGE = 1e-3  # relative change of all stiffnesses at which the substitutions end
+SUBSTITUTION_TOL = 1e-3  # relative change of all stiffnesses at which the substitutions end
 
 
 class BalancedMotions(NamedTuple):
@@ -71,6 +71,11 @@ def balance_first_harmonic(modes: ModalBasis, laws, acceleration: float, omega) 
         Amplitude of the drive [m s-2].
     omega : (k,) array
         Circular frequencies [rad/s].
+
+    Returns
+    -------
+    BalancedMotions
+        The last substitution, whether it has converged or not.
     """
     rows = modes.interfaces
     n = modes.omega.size
@@ -90,7 +95,7 @@ def balance_first_harmonic(modes: ModalBasis, laws, acceleration: float, omega) 
         for i, table in enumerate(tables):
             change[:, i] += table.find_stiffness(np.abs(slides[:, i]))
         stiffness += 0.5 * change
-        if np.abs(change).max() <= MAX_CHANGE * np.abs(stiffness).max():
+        if np.abs(change).max() <= SUBSTITUTION_TOL * np.abs(stiffness).max():
             break
     loads = np.column_stack([-stiffness * slides, np.ones(len(omega))])
     return BalancedMotions(omega, (receptance @ loads[:, :, None])[:, :, 0], slides)

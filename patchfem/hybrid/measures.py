@@ -25,9 +25,8 @@ from .records import (
     Window,
 )
 
-MIN_ENERGY = (
-    1e-6  # imbalance that counts as round-off, relative to the energy of the smallest speed
-)
+# Imbalance that counts as round-off, relative to the energy of the smallest speed
+MIN_ENERGY = 1e-6
 # Measures of every interface; those of further ones carry its number. Other measures are those of the first one alone.
 INTERFACE_MEASURES = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")
 

@@ -30,9 +30,8 @@ from .runs import MESSAGES, Motion, run_case
 
 MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
 
-MIN_DIFFERENCE = (
-    1e-6  # smallest step of the derivatives of the map, relative to the scale of an unknown
-)
+# Smallest step of the derivatives of the map, relative to the scale of an unknown
+MIN_DIFFERENCE = 1e-6
 MAX_SEARCHES = 10  # searches for a motion, between which it is followed for some periods
 N_FIRST_CYCLES = 8  # cycles before the first correction
 N_RELAXED = 6  # cycles without a correction after a search that failed, and twice as many after the next one
@@ -51,15 +50,12 @@ MAX_STABLE_MULTIPLIER = 1 + 1e-3
 UNDAMPED_TOL = 2e-6
 NEUTRAL_TOL = 1e-9  # distance of a multiplier from 1, relative to the largest, that counts as none
 SINGULAR_TOL = 1e-13  # the same for a correction
-N_GROWTH_CYCLES = (
-    60  # cycles of each of three runs, in which a growing motion increases by similar amounts
-)
-MIN_SIZE_RATIO = (
-    1e3  # smallest ratio of a periodic motion that is never reached to the motion after these runs
-)
-SEARCH_STEPS_RATIO = (
-    3.0  # steps of the search for a periodic motion beside them, relative to theirs
-)
+# Cycles of each of three runs, in which a growing motion increases by similar amounts
+N_GROWTH_CYCLES = 60
+# Smallest ratio of a periodic motion that is never reached to the motion after these runs
+MIN_SIZE_RATIO = 1e3
+# Steps of the search for a periodic motion beside them, relative to theirs
+SEARCH_STEPS_RATIO = 3.0
 # Largest ratio of the changes over a period after and before a correction at which the derivatives of this correction
 # are used again. The ratio is about the relative change of the derivatives.
 MAX_REMAINDER = 1e-3
@@ -67,9 +63,9 @@ MAX_NEWTON_STEPS = 20  # Newton steps to a motion from a similar one
 # Largest ratio of the changes over a period after and before such a step at which the derivatives are updated. Further
 # steps with these derivatives take a period each, new derivatives take one for each unknown.
 MAX_BROYDEN_RATIO = 0.3
-MAX_DETOURS = (
-    3  # largest number of shortened Newton steps, and of Newton steps with new derivatives
-)
+# Largest number of shortened Newton steps, and of Newton steps with new derivatives
+MAX_DETOURS = 3
+MIN_STOP = 1e-9  # shortest rest of rigid friction that is counted, in periods
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
 
@@ -316,7 +312,7 @@ class Shooting:
         end = self.period / 2 if odd_laws else self.period
         self.case = replace(self.whole, ends=np.array([end]))
         self.state = make_arrays(case)[0]
-        # The same arrays serve for all periods, because a call with known arrays is shorter.
+        # All periods use the same arrays, because a call looks up the addresses of new ones.
         self.work, self.record = make_arrays(self.case)
         if not self.measures_periods:
             self.record.cycles[:, Cycle.WINDOW] = -1.0
@@ -329,9 +325,8 @@ class Shooting:
         self.n_periods = 0
         self.n_steps = 0.0
         self.map: PeriodMap | None = None
-        self.has_exact_map = (
-            False  # whether the derivatives are those near the motion that was found
-        )
+        # Whether the derivatives are those near the motion that was found
+        self.has_exact_map = False
         # The errors of a period, of the size of the step tolerance, and of the difference are equal.
         self.difference = max(MIN_DIFFERENCE, float(settings[Setting.RTOL]) ** 0.5)
 
@@ -418,7 +413,7 @@ class Shooting:
         return before, self.measure_change(before)
 
     def find_excess(self, step, start) -> float:
-        """Return the ratio of a Newton step to the longest one; both are packed states, as its `start`."""
+        """Return the length of a Newton step (k,) from a packed state (k,), relative to its limit; 0 without one."""
         return 0.0
 
     def find_fixed_point(
@@ -442,9 +437,7 @@ class Shooting:
         best = np.inf
         n_long = n_maps = n_regimes = 0
         is_new = False
-        self.has_exact_map = (
-            False  # whether the derivatives are those near the motion that is found
-        )
+        self.has_exact_map = False
         for count in range(1, MAX_NEWTON_STEPS + 1):
             before = self.state
             self.relax(1)

@@ -1,12 +1,13 @@
 """Periodic motions that meet further conditions, and their curves over a parameter of the drive, through their folds.
 
-The state is extended by unknowns without rates, such as a frequency, and the map of a period changes each of them by what a
-condition misses, so that a motion that meets all conditions is a fixed point. The condition of a curve is the value of its
-parameter, or a distance along the curve (pseudo-arc-length continuation: Keller 1977; Seydel, Practical Bifurcation and
-Stability Analysis, 2010, ch. 4). Derivatives are evaluated once at each point; between two points Broyden's method
+The state is extended by unknowns without rates, such as a frequency, and the map of a period changes each of them by the
+residual of a condition, so that a motion that meets all conditions is a fixed point. The condition of a curve is the value
+of its parameter, or a distance along the curve (pseudo-arc-length continuation: Keller 1977; Seydel, Practical Bifurcation
+and Stability Analysis, 2010, ch. 4). Derivatives are evaluated once at each point; between two points Broyden's method
 updates them (Math. Comp. 19, 577, 1965). The reversal points that the laws remember are unknowns as well.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -36,9 +37,8 @@ MIN_ARC_STEP = 1e-7  # smallest step of the arc length
 MAX_CORRECTION = 0.5  # longest Newton step, as arc length
 MIN_STEP_COSINE = 0.7  # smallest cosine between a step and the tangent; a larger angle is a jump
 MIN_TANGENT_COSINE = 0.1  # smallest cosine between two tangents in the cubic through a fold
-SAME_CURVE_TOL = (
-    0.05  # distance from an earlier step, relative to its length, at which a curve has closed
-)
+# Distance from an earlier step, relative to its length, at which a curve has closed
+SAME_CURVE_TOL = 0.05
 RANK_TOL = 1e-12  # singular values of a singular matrix are below it, relative to the largest
 
 
@@ -55,7 +55,7 @@ class PathSettings(NamedTuple):
     max_points: int = 2000
 
 
-class ExtendedShooting(Shooting):
+class ExtendedShooting(Shooting, ABC):
     """Map of a period of a state that is extended by unknowns without rates, which stand after the states of the laws.
 
     A class sets what they mean by `set_extra`, and the conditions that determine them by `find_conditions`. After a period
@@ -82,13 +82,13 @@ class ExtendedShooting(Shooting):
         rig = case.rig._replace(scales=np.insert(case.rig.scales, places, scales))
         super().__init__(replace(case, rig=rig, y=np.insert(case.y, places, values)), odd_laws)
 
+    @abstractmethod
     def set_extra(self, values) -> None:
         """Give the rig of the next period the further unknowns (e,)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def find_conditions(self, before: State) -> np.ndarray:
-        """Return what the conditions miss (e,) in the period from a state, as changes of the further unknowns."""
-        raise NotImplementedError
+        """Return the residuals (e,) of the conditions in the period from a state, as changes of the further unknowns."""
 
     def advance(self, state: State) -> State:
         """Return the state a period after another one, its further unknowns corrected by the conditions."""

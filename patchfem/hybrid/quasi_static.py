@@ -24,9 +24,8 @@ from .periodic import find_periodic_motion
 LOOP_RTOL = 1e-11  # tolerance of a step of a loop without a closed form
 TEST_RATE_RATIO = 2.0  # ratio of two drive frequencies at which the loops of a law are compared
 LOOP_TOL = 1e-6  # relative change of a loop that is due to its steps
-SLIDE_ROOT_TOL = (
-    1e-13  # change of the slides, relative to those of the stuck mode, at which their search ends
-)
+# Change of the slides, relative to those of the stuck mode, at which their search ends
+SLIDE_ROOT_TOL = 1e-13
 SLIDE_TOL = 1e-9  # relative error of the slides of an equilibrium
 SPEED_MESSAGE = "a friction force that depends on the sliding speed has no static loop"
 

@@ -26,7 +26,7 @@ from .case_rows import (
     Number,
     Seen,
 )
-from .law_rows import Law, Memory
+from .law_rows import Law, LawNumber, Memory
 from .smooth_laws_kernels import PointLaw
 
 # Pieces of a run, which take 1 to 2 CPU seconds. A law that needs more is so much faster than the drive that a single run
@@ -73,7 +73,7 @@ def march_cases(steps, parameters, laws, nows, seens, histories, loops):
     parameters : (c, 12) array
         Numbers of the cases, in the order of `case_rows.Number`.
     laws : ((c, k) array, (c, l) array)
-        Numbers of the laws, of which column 0 is the `Law`, and their memory (changed in place).
+        Numbers of the laws, in the order of `LawNumber`, and their memory (changed in place).
     nows : (c, 2, 18) array
         States of the cases, and before the last cycle, in the order of `case_rows.Now` (output).
     seens : (c, 20) array
@@ -91,7 +91,7 @@ def march_cases(steps, parameters, laws, nows, seens, histories, loops):
         before = nows[j, 1]
         seen = seens[j]
         law = PointLaw(numbers[j], memory[j])
-        is_linear = numbers[j, 0] <= Law.JENKINS
+        is_linear = numbers[j, LawNumber.LAW] <= Law.JENKINS
         same = SAME_CASE_CYCLE if is_linear else SAME_SMOOTH_CYCLE / float(steps) ** 3
 
         # State at the start

@@ -15,7 +15,7 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from .case_rows import Loop, Now, Number, Seen
-from .law_rows import Law
+from .law_rows import Law, LawNumber
 from .smooth_laws_kernels import Branch, PointLaw, Step, find_force, find_share
 
 N_READ = 2  # measured cycles of a motion that repeats
@@ -23,9 +23,8 @@ STEP_ROUND_OFF = 1e-9  # remainder of a cycle relative to a step that belongs to
 N_PARABOLAS = 3  # further parabolas for an extreme of force or acceleration, each four times as narrow as the last
 SAME_SLIDE = 1e-12  # relative difference of slides that is round-off
 STICK_SHARE = 0.5  # irreversible part of the motion from which a point slips
-MAX_LEVEL_STEPS = (
-    12  # steps of the Illinois method for the instant at which slip begins, ends or turns
-)
+# Steps of the Illinois method for the instant at which slip begins, ends or turns
+MAX_LEVEL_STEPS = 12
 LEVEL_TOLERANCE = 1e-4  # tolerance of this instant relative to the piece
 
 
@@ -183,7 +182,7 @@ def probe(piece, part, motion):
     v = (velocity + part * (acceleration + slope)) / dt
 
     # The force of a law that is linear between events is linear in the slide.
-    if law.numbers[0] <= Law.JENKINS:
+    if law.numbers[LawNumber.LAW] <= Law.JENKINS:
         force = first.force
         if change != 0:
             force += (last.force - first.force) * dq / change
@@ -509,7 +508,7 @@ def observe_motion(piece, motion, output, seen):
     peak = find_peak(piece, (0.0, output, case[Number.BASE]), motion)
     seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
     # Forces of other laws have their extremes at the ends of pieces.
-    if numbers[0] == Law.TANH or numbers[0] == Law.LUGRE:
+    if numbers[LawNumber.LAW] == Law.TANH or numbers[LawNumber.LAW] == Law.LUGRE:
         peak = find_peak(piece, (1.0, 0.0, 0.0), motion)
         seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], peak)
 

@@ -14,7 +14,7 @@ from ..motion_measures import (
     ratio_or_zero,
 )
 from .case_rows import Cases, Loop, Now, Number, Seen
-from .law_rows import Law, Masing, Memory
+from .law_rows import Law, LawNumber, Masing, Memory
 
 # Nested reversals that parallel sliders remember. A decay by 3 % from one to the next has reached 2e-7 of its start. After
 # decays of 1000 to 5000 reversals, forces of a motion that grows again are wrong by up to 4e-3 of the limit.
@@ -88,7 +88,7 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
     loops = np.full((n, 1 + int(columns[Number.WINDOW].max(initial=0)), len(Loop)), np.nan)
-    is_masing = cases.numbers[0, 0] == Law.MASING
+    is_masing = cases.numbers[0, LawNumber.LAW] == Law.MASING
     memory = np.zeros((n, Masing.STACK + 2 * REVERSALS if is_masing else len(Memory)))
     if is_masing:
         memory[:, Masing.VIRGIN] = 1.0
@@ -132,7 +132,7 @@ def find_mean_stretches(cases: Cases, now, seen, loops) -> np.ndarray:
 
 def is_linear_between_events(cases: Cases) -> bool:
     """Return whether the law of the cases is linear between events, so that their march is exact with any steps."""
-    return cases.numbers[0, 0] <= Law.JENKINS
+    return cases.numbers[0, LawNumber.LAW] <= Law.JENKINS
 
 
 def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.ndarray]:

@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class Law(IntEnum):
-    """Number of a friction law in column 0 of `numbers`; laws up to JENKINS are linear between events.
+    """Number of a friction law; laws up to JENKINS are linear between events.
 
     - COULOMB: rigid friction
     - JENKINS: spring and slider in series
@@ -24,8 +24,9 @@ class Law(IntEnum):
 
 
 class LawNumber(IntEnum):
-    """Columns of the numbers of a law, of which column 0 has the `Law`; LUGRE has those of `LuGreNumber`.
+    """Columns of the numbers of a law; LUGRE has those of `LuGreNumber` after the first.
 
+    - LAW: the `Law`
     - LIMIT: friction limit [N], of COULOMB the static one
     - KINETIC: kinetic limit of COULOMB [N]
     - SPEED: reference speed of TANH [m/s]
@@ -34,6 +35,7 @@ class LawNumber(IntEnum):
     - EXPONENT, SHAPE: parameters of BOUC_WEN
     """
 
+    LAW = 0
     LIMIT = 1
     KINETIC = 2
     SPEED = 2

@@ -5,7 +5,6 @@ import numpy as np
 from ..core import MIN_LOAD
 from .law_rows import Law
 
-N_NUMBERS = 7  # columns of numbers of a point
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
 # Number of each law, and the attributes of a law of `friction` in the order of its numbers; those with a star are per
 # newton of load
@@ -18,6 +17,8 @@ POINT_LAWS = {
     "lugre": (Law.LUGRE, "static* kinetic* stiffness* speed micro_damping* viscous*"),
     "nonlocal": (Law.BONDS, "static* length"),
 }
+# Columns of numbers of a point: its `Law`, and the numbers of the law that has most of them
+N_NUMBERS = 1 + max(len(attributes.split()) for _, attributes in POINT_LAWS.values())
 
 
 def list_point_law(name: str, law, load) -> list[float | np.ndarray]:

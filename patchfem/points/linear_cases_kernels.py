@@ -196,7 +196,7 @@ def make_point(case, numbers):
         Numbers of the law.
     """
     limit = numbers[LawNumber.LIMIT]
-    if numbers[0] == Law.COULOMB:
+    if numbers[LawNumber.LAW] == Law.COULOMB:
         return Point(limit, numbers[LawNumber.KINETIC], 0.0, case[Number.MOBILITY])
     return Point(limit, limit, limit / numbers[LawNumber.LENGTH], case[Number.MOBILITY])
 

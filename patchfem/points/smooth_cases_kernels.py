@@ -39,10 +39,10 @@ MAX_END_STEPS = 8  # Newton steps for the instant of a turn, or of a corner of t
 END_TOLERANCE = 1e-6
 # Steps per cycle at which the shortest step is a radian of the vibration above a stiff law, or the time of its relaxation
 REFERENCE_STEPS = 16.0
-FLAT_SPEED = (
-    6.0  # velocity relative to the speed of a law above which its force changes by less than 2e-5
-)
-APPROACH = 0.7  # part of the way there that a step may take, so that it does not pass it if the acceleration grows
+# Velocity relative to the speed of a law above which its force changes by less than 2e-5
+FLAT_SPEED = 6.0
+# Part of the way there that a step may take, so that it does not pass it if the acceleration grows
+APPROACH = 0.7
 
 
 class Body(NamedTuple):
@@ -106,7 +106,7 @@ def take_step(first, dt, body):
     """
     case = body.case
     law = body.law
-    kind = law.numbers[0]
+    kind = law.numbers[LawNumber.LAW]
     half = 0.5 * dt
     c = cos(case[Number.OMEGA] * half)
     s = sin(case[Number.OMEGA] * half)
@@ -195,7 +195,7 @@ def find_longest_step(first, tangent, body):
     case = body.case
     numbers = body.law.numbers
     grade = body.grade
-    law = numbers[0]
+    law = numbers[LawNumber.LAW]
     mobility = case[Number.MOBILITY]
     if law != Law.TANH:
         dt = grade / sqrt(mobility * tangent + case[Number.STIFFNESS] + case[Number.OMEGA] ** 2)

@@ -81,13 +81,13 @@ def find_force(law, step, commits):
     """
     numbers = law.numbers
     memory = law.memory
-    if numbers[0] == Law.TANH:
+    if numbers[LawNumber.LAW] == Law.TANH:
         # tanh x = 1 - 2/(exp(2 x) + 1), in two thirds of the time and to the same fraction of the limit
         growth = exp(2 * step.end_velocity / numbers[LawNumber.SPEED])
         return numbers[LawNumber.LIMIT] * (1 - 2 / (growth + 1))
-    if numbers[0] == Law.LUGRE:
+    if numbers[LawNumber.LAW] == Law.LUGRE:
         return follow_bristles(law, step, commits)
-    if numbers[0] == Law.MASING:
+    if numbers[LawNumber.LAW] == Law.MASING:
         return follow_sliders(law, step.increment, commits)
 
     # Stretch along the motion relative to the length, and its mean square over the bonds
@@ -96,7 +96,7 @@ def find_force(law, step, commits):
     direction = 1.0 if step.increment > 0 else -1.0
     path = abs(step.increment) / length
     z = direction * memory[Memory.STRETCH] / length
-    if numbers[0] == Law.BONDS:
+    if numbers[LawNumber.LAW] == Law.BONDS:
         decay = exp(-path)
         end = 1 - (1 - z) * decay
         square = 2 + (memory[Memory.SQUARE] - 2 - 2 * (1 - z) * path) * decay
@@ -312,10 +312,10 @@ def find_branch(first, law):
     rate = first.velocity if first.velocity != 0 else first.acceleration
     direction = 1.0 if rate > 0 else -1.0
     length = numbers[LawNumber.LENGTH]
-    if numbers[0] == Law.BOUC_WEN:
+    if numbers[LawNumber.LAW] == Law.BOUC_WEN:
         path = length * find_path_to_rest(direction * memory[Memory.STRETCH] / length, numbers)
         return Branch(first.slide, direction, length, path)
-    if numbers[0] != Law.MASING:
+    if numbers[LawNumber.LAW] != Law.MASING:
         return Branch(first.slide, direction, 1.0, inf)
     n = int(memory[Masing.COUNT])
     turns = direction * memory[Masing.DIRECTION] < 0
@@ -335,7 +335,7 @@ def find_branch(first, law):
 @njit(**NJIT_KERNEL)
 def find_first_tangent(numbers):
     """Return the stiffness [N/m] of a law after a turn, by its `numbers` (k,)."""
-    law = numbers[0]
+    law = numbers[LawNumber.LAW]
     if law == Law.TANH:
         return 0.0
     if law == Law.LUGRE:
@@ -362,7 +362,7 @@ def find_share(at, branch, numbers):
     numbers : (k,) array
         Numbers of the law.
     """
-    law = numbers[0]
+    law = numbers[LawNumber.LAW]
     if law == Law.TANH:
         return 1.0
     if law <= Law.JENKINS:

@@ -164,7 +164,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
 
 
 def _find_last_turns(places, ripple: float) -> list[int]:
-    """Return the indices of the last four turns, the last one first, of reversals at `places` (k,) [m]; fewer if there are.
+    """Return the indices of the last four turns, the last one first, of reversals at `places` (k,) [m], or those that exist.
 
     Between successive turns, which are minima and maxima in turn, the motion exceeds the `ripple` [m].
     """
@@ -271,11 +271,11 @@ def _smooth_values(values, indices, span) -> np.ndarray:
 class Slopes(NamedTuple):
     """Slopes of a quantity per half cycle, with half-widths of 95 % intervals and with spans.
 
-    All arrays are (k,). A span is the number of half cycles on either side of a point.
+    All arrays are (k,).
 
-    - slope: change per half cycle
-    - error: half-width of its 95 % interval
-    - span: of each point
+    - slope: change per half cycle.
+    - error: half-width of its 95 % interval.
+    - span: number of half cycles on either side of the point.
     """
 
     slope: np.ndarray

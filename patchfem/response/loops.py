@@ -26,8 +26,8 @@ MIN_MOVING_STEP_RATIO = 1e-3
 class Reversal(NamedTuple):
     """A reversal of the relative displacement.
 
-    - slide: relative displacement [m]
-    - force: friction force [N], or None if it is unknown, e.g. if the interface is at rest at an end of the window
+    - slide: relative displacement [m].
+    - force: friction force [N], or None if it is unknown, e.g. if the interface is at rest at an end of the window.
     """
 
     slide: float

@@ -7,7 +7,7 @@ definitions of the measures.
 import numpy as np
 
 from .. import friction
-from ..core import Measure, Response
+from ..core import Measure, Response, add_interface_number
 from ..motion_measures import (
     MAX_RESTING_SLIDE_RANGE,
     MIN_ENERGY_DIFFERENCE,
@@ -176,7 +176,7 @@ def compute_ledger_measures(ledger) -> Values:
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 
 
-def compare_loop_work(work, loops, jumps: bool = False) -> float:
+def compare_loop_work(work, loops, jumps: bool) -> float:
     """Return the relative difference [1] between the friction work of the engine and int F dx over the samples.
 
     |sum of int F dx over all directions by the trapezoidal rule - work| / (sum over all steps of |change of work|). It
@@ -290,9 +290,8 @@ def bound_sampling_errors(window: Response) -> Values:
     """
     errors = {"absolute_acceleration_peak": interpolate_peak(np.abs(window.acceleration))[1]}
     for k, (force, slip) in enumerate(zip(np.abs(window.forces).T, window.slips.T)):
-        number = f"_{k + 1}" if k else ""
-        errors[f"friction_force_peak{number}"] = interpolate_peak(force)[1]
-        errors[f"slip_amplitude{number}"] = interpolate_range(slip)[1] / 2
+        errors[add_interface_number("friction_force_peak", k)] = interpolate_peak(force)[1]
+        errors[add_interface_number("slip_amplitude", k)] = interpolate_range(slip)[1] / 2
     errors = {name: error for name, error in errors.items() if error > 0}
 
     # A parabola through three samples of distance h exceeds the middle one by at most an eighth of h^2 y''.

@@ -236,19 +236,19 @@ def _make_random_rows(
     return value_row, scatter_row
 
 
-# Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
-# because batches compute only the measures of this package.
 AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
 STICK_FRACTION = "stick_fraction"
 SLIP_START_PHASE = "slip_start_phase"
 STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapolated
+# Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
+# because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
 UNIT_LARGER_TERM = ("1", lambda _: 1.0)  # larger term of a fraction and of a relative difference
 # Order of convergence of values that are interpolated by cubics between samples.
 CUBIC_CONVERGENCE_ORDER = 4.0
 MOTION_MEASURE_ROWS = (
     MeasureDefinition(
-        "relative_displacement_amplitude",
+        AMPLITUDE,
         "m",
         1e-10,
         "half the peak-to-peak displacement at the output, relative to "
@@ -331,7 +331,7 @@ MOTION_MEASURE_ROWS = (
         friction_scale=lambda scale: scale.bond_length,
     ),
     MeasureDefinition(
-        "stick_fraction",
+        STICK_FRACTION,
         "1",
         1e-3,
         "fraction of the time of the last cycles during which the interface as a whole sticks; the interface sticks "
@@ -345,7 +345,7 @@ MOTION_MEASURE_ROWS = (
         flags="interface level",
     ),
     MeasureDefinition(
-        "slip_start_phase",
+        SLIP_START_PHASE,
         "rad",
         1e-3,
         "phase of the drive (of the base displacement, or of the force) at which slip starts after stick, modulo pi; "
@@ -485,7 +485,7 @@ MOTION_MEASURE_ROWS = (
         larger_term=UNIT_LARGER_TERM,
     ),
     MeasureDefinition(
-        "relative_displacement_amplitude_steady",
+        STEADY_AMPLITUDE,
         "m",
         1e-10,
         "steady amplitude under a periodic drive, extrapolated if the motion has not settled or may still change by "

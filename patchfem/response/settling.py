@@ -38,7 +38,7 @@ class MotionEnds(NamedTuple):
     steady: np.ndarray
 
 
-def judge_motions(extremes, phasors, window: int, tolerance, floor=0.0, decay=0.0) -> MotionEnds:
+def judge_motions(extremes, phasors, window: int, tolerance, floor, decay) -> MotionEnds:
     """Classify n motions under periodic drives, and estimate their steady amplitudes.
 
     A motion is steady only if both the difference from its steady estimate and the remaining free motion are
@@ -344,7 +344,7 @@ def join_cycles(extremes, phasors, count: int) -> tuple[np.ndarray, np.ndarray]:
     return joined, phasors[first + count - 1 :: count]
 
 
-def estimate_free_motion(windows: Windows, decay=0.0):
+def estimate_free_motion(windows: Windows, decay):
     """Return the amplitude [m] of the decaying free motion that remains in the last window.
 
     A free motion near the drive frequency causes a beat. If the beat is shorter than a window, the amplitude

@@ -259,9 +259,10 @@ def _interface_stiffnesses(model: Model) -> "of_rig.Chain":
         stiffnesses["grooves"] = model.grooves.stiffness(load)
     stiffnesses["bonds"] = _law_stiffness(model.friction, load)
     others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
-    for number, interface in enumerate(others, 2):
-        interface_load = load if interface.load is None else interface.load
-        stiffnesses[f"bonds_{number}"] = _law_stiffness(interface.numbers, interface_load)
+    for number, interface in enumerate(others, 1):
+        name = add_interface_number("bonds", number)
+        own_load = of_rig.find_interface_load(model, interface)
+        stiffnesses[name] = _law_stiffness(interface.numbers, own_load)
     return stiffnesses
 
 
@@ -330,12 +331,12 @@ class HistoryBytes(NamedTuple):
     - sample: per value of a stored sample, with derived arrays [bytes]; measured: 0.8 to 1.2 times this for random records
       of 4e5 to 2e6 samples.
     - cycle: per cycle of a run and its coarse runs [bytes]; measured: 0.8 to 1.3 times this over 1e6 to 1e7 cycles.
-    - turn: per value of a reversal that is stored before the window [bytes]; measured: 0.8 to 1.5 times this.
+    - reversal: per value of a reversal that is stored before the window [bytes]; measured: 0.8 to 1.5 times this.
     """
 
     sample: float
     cycle: float
-    turn: float
+    reversal: float
 
 
 # Memory of the histories by engine
@@ -403,7 +404,7 @@ def _list_memory_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryP
     steps = settings.steps if plan.engine == "march" else HYBRID_SAMPLES_PER_STORED_CYCLE
     samples = max(2, settings.window) * steps
     width = 2.0 * n_modes + 12 + 6 * n_interfaces
-    turns = min(REVERSALS_PER_CYCLE * drive.cycles, structure.drive_sizes.MAX_EARLY_SAMPLES)
+    n_reversals = min(REVERSALS_PER_CYCLE * drive.cycles, structure.drive_sizes.MAX_EARLY_SAMPLES)
     length = "drive.duration" if drive.waveform.is_random else "drive.cycles"
 
     return [
@@ -414,7 +415,7 @@ def _list_memory_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryP
             f"lower {'accuracy.steps_per_cycle' if has_steps else length}",
         ),
         MemoryPart(
-            history.cycle * drive.cycles + history.turn * width * turns,
+            history.cycle * drive.cycles + history.reversal * width * n_reversals,
             f"the histories of {drive.cycles:.3g} cycles",
             f"lower {length}",
         ),

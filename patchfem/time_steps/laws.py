@@ -91,7 +91,7 @@ class PointLaw(NamedTuple):
         return Blocks(numbers, memory, load, back, counts)
 
     def select(self, points) -> "PointLaw":
-        """Return the selected points, by a mask (m,)."""
+        """Return the law of the points that a mask (m,) selects."""
         back = None if self.back is None else self.back[points]
         arrays = self.numbers, self.memory, self.load, self.stiffness, self.viscosity
         return PointLaw(self.law, *(array[..., points] for array in arrays), self.sliders, back)

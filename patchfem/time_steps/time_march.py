@@ -134,6 +134,7 @@ def load_kernels(contact: Contact, say=None):
     say : callable, optional
         Callback for a line of text.
     """
+    compiled.report_compilation_to(say)
     parts = {}
     if contact.sets is None:
         parts["normal"] = "time_steps.no_normal_kernels"
@@ -141,9 +142,9 @@ def load_kernels(contact: Contact, say=None):
     if not contact.has_lists:
         step_parts["lists"] = "time_steps.no_lists_kernels"
     if module := contact.law_module:
-        step_parts["laws"] = compiled.instantiate("time_steps.laws_kernels", {"own": module}, say)
-    steps = compiled.instantiate("time_steps.march_kernels", step_parts, say)
-    return compiled.instantiate("time_steps.loop_kernels", parts | {"steps": steps}, say)
+        step_parts["laws"] = compiled.instantiate("time_steps.laws_kernels", {"own": module})
+    steps = compiled.instantiate("time_steps.march_kernels", step_parts)
+    return compiled.instantiate("time_steps.loop_kernels", parts | {"steps": steps})
 
 
 def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:

@@ -145,6 +145,9 @@ def test_exact_order_of_power_is_observed(order):
         run for run in runs if 3.3 * run.value**-order <= 1e-2 * run.measures["loop_area"].value
     ]
     assert sufficient is (fits[0] if fits else None)
+    # without its error the finest run is not known to be accurate
+    forget_errors(runs[-1], "loop_area")
+    assert find_sufficient_run(runs, "loop_area", found, 1e-2) is None
 
 
 def test_exact_values_without_a_limit_have_no_order():

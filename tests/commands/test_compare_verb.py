@@ -61,3 +61,25 @@ def test_exact_given_shift_is_used(trace_pair):
     """A given shift in um is used: beyond the traces it gives no common place."""
     words = ("compare", *trace_pair, "--shift", f"{10_000 - SHIFT / UM:.1f} um", "--json")
     assert run_cli(*words).content["reference"] != "place"
+
+
+def test_exact_scene_is_pressed_with_both_surfaces(trace_pair, tmp_path):
+    """compare --scene has the measures of single runs with each trace, and a chart of both pressures."""
+    scene = tmp_path / "scene.toml"
+    pieces = (
+        'length = "2 mm"\nwidth = "1 mm"\nheight = "1 mm"\nload = "100 N"\nsubstrate = "steel"\n'
+    )
+    scene.write_text(f"[contact]\n{pieces}[accuracy]\ntolerance = 1e-2\n", "utf-8")
+    out = tmp_path / "out"
+    assert run_cli("compare", *trace_pair, "--scene", scene, "-o", out).code == 0
+    assert ".partial" not in (out / "compare.json").read_text("utf-8")
+    pressed = read_json(out / "compare.json")["pressed"]["measures"]
+    assert {"pressure_peak", "normal_stiffness", "approach"} <= pressed.keys()
+    assert "Pressure on the interface" in read_page(out)
+    for side in ("before", "after"):
+        file = f"contact.profile.file={out}/surface_{side}.csv"
+        sets = ("--set", file, "--set", "contact.profile.heights=surface")
+        assert run_cli("run", scene, *sets, "-o", tmp_path / side).code == 0
+        measures = read_json(tmp_path / side / "summary.json")["measures"]
+        for name, pair in pressed.items():
+            assert pair[side] == measures[name]

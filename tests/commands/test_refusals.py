@@ -113,6 +113,14 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
             ("--pairs", "pairs.csv", "--scene", "rig.toml"),
             ("--scene cannot be used with a table of pairs",),
         ),
+        (
+            ("trace.csv", "trace.csv", "--scene", "rig.toml", "--piece", "upper"),
+            ("--piece cannot be used with --scene",),
+        ),
+        (
+            ("trace.csv", "trace.csv", "--set", "contact.load=1 N"),
+            ("--set cannot be used with surfaces alone, without --scene",),
+        ),
     ],
     "profile": [
         (("trace.csv", "--cutoff", "0.25"), ("--cutoff: '0.25' is a bare number without a unit",)),

@@ -1,5 +1,7 @@
 """A results folder has one writer: simultaneous starts, killed owners, interrupted renames."""
 
+import errno
+import fcntl
 import os
 import subprocess
 import sys
@@ -108,6 +110,23 @@ def test_exact_lock_is_that_of_open_file(tmp_path, left):
     lock.release()
     assert path.exists()
     other.release()
+    assert not path.exists()
+
+
+def test_disk_without_locks_lets_all_writers_through(tmp_path, monkeypatch):
+    """Where the disk refuses every lock, a second writer is not refused, and each removes its file without an error."""
+
+    def refuse(file, operation):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    path = tmp_path / "lock"
+    locks = [FolderLock(path, "out", "run") for _ in range(2)]
+    for lock in locks:
+        lock.acquire()
+        assert path.read_text() == str(os.getpid())
+    for lock in locks:
+        lock.release()
     assert not path.exists()
 
 

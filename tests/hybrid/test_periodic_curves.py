@@ -52,8 +52,8 @@ def trace_frequencies(modes, laws, level, ends):
     return equations, equations.follow(ends, STEPS)
 
 
-def list_coexisting_motions(modes, laws, drive):
-    """Return the motions under a drive in increasing amplitude."""
+def trace_levels(modes, laws, drive):
+    """Return the equations and the path of the motions over the level [m s-2] of a drive, up to ten times its own."""
 
     def make(level):
         return make_case(modes, laws, SineDrive(level, drive.omega))
@@ -61,7 +61,12 @@ def list_coexisting_motions(modes, laws, drive):
     weak = 1e-2 * drive.acceleration
     start = (find_periodic_motion(make(weak)).run.final, weak)
     equations = MotionCurve(make, *start, has_kinks=False)
-    path = equations.follow((0.0, 10 * drive.acceleration), PathSettings(0.005, 0.02))
+    return equations, equations.follow((0.0, 10 * drive.acceleration), PathSettings(0.005, 0.02))
+
+
+def list_coexisting_motions(modes, laws, drive):
+    """Return the motions under a drive in increasing amplitude."""
+    equations, path = trace_levels(modes, laws, drive)
     motions = [point.motion for point in equations.list_crossings(path, drive.acceleration)]
     return sorted(motions, key=lambda motion: motion.run.values[AMPLITUDE])
 
@@ -82,6 +87,25 @@ def test_continuation_ends_with_count_of_steps():
     shooting.limit_steps(100)
     with pytest.raises(NotConverged, match=r"needs more than 1e\+02 steps"):
         shooting.relax(10)
+
+
+def test_exact_closed_curve_ends_after_one_turn():
+    """At 160 Hz the level of the motions has a maximum L over their amplitude. Under the level (0.99 + p^2) L their curve
+    over p is closed: it is followed once, and turns back where the level is L, at p = 0.1 and at p = -0.1."""
+    omega = 2 * np.pi * 160
+    equations, path = trace_levels(RIG, DUFFING, SineDrive(0.7 * LEVEL, omega))
+    highest = max(path.folds)
+    start = equations.list_crossings(path, 0.99 * highest)[0].motion.run.final
+
+    def make(p):
+        return make_case(RIG, DUFFING, SineDrive((0.99 + p * p) * highest, omega))
+
+    closed = MotionCurve(make, start, 0.0, has_kinks=False).follow((-0.2, 0.2), PathSettings())
+    assert closed.ended == "loop" and closed.folds == pytest.approx((0.1, -0.1), rel=2e-3)
+    p = np.array([point.w[-1] for point in closed.points])
+    size = np.array([point.motion.run.values[AMPLITUDE] for point in closed.points])
+    turned = np.unwrap(np.arctan2(p / 0.1, (size - size.mean()) / np.ptp(size)))
+    assert 2 * np.pi <= abs(turned[-1] - turned[0]) < 2.2 * np.pi
 
 
 def make_sine_case(omega: float) -> cases.Case:

@@ -49,7 +49,6 @@ def test_always_cases_agree_with_single_runs_within_errors(extra):
     group = make_group(BLOCK + COATING + extra)
     batch = folder.case_meshes.solve_cases(group, LOADS.size, TOLERANCE)
     assert batch.outcome.tolist() == [folder.cases.OutcomeCode.DONE] * LOADS.size
-    assert batch.reason.tolist() == [folder.cases.Reason.NONE] * LOADS.size
     assert batch.excess.max() <= 1
     for case, measures in enumerate(list_single_runs(group)):
         assert measures.keys() == batch.values.keys()
@@ -93,8 +92,6 @@ def test_always_failed_case_does_not_stop_the_others():
         folder.cases.OutcomeCode.DONE,
     ]
     assert batch.outcome.tolist() == expected
-    assert batch.reason[1] == folder.cases.Reason.REFUSED and isinstance(
-        batch.messages[1], PatchfemError
-    )
+    assert isinstance(batch.messages[1], PatchfemError) and batch.messages.keys() == {1}
     assert np.isnan(batch.values["pressure_peak"][1])
     assert batch.excess[[0, 3]].max() <= 1

@@ -121,7 +121,7 @@ class CurveComparison(Comparison):
         self.method = CURVE_METHODS[-1]
         self.reasons: dict[str, NotConverged] = {}
         self.n_reweightings = 0
-        # whether the intervals contain the numerical error of the curve
+        # sentence on whether the intervals contain the numerical error of the curve
         self.error_note = ""
 
     @property

@@ -75,7 +75,8 @@ class Comparison(ABC):
     listener = SILENT_LISTENER
     # What the values are called in messages.
     values_name = "rows"
-    # Whether an evaluation is so expensive that only the last descent has a tight tolerance.
+    # Whether the model takes so long to compute that all descents but the last use a looser tolerance and one-sided
+    # differences.
     is_expensive = False
     interval_kind = IntervalKind.ROWS
 

@@ -151,10 +151,7 @@ def _group_models(
 
 
 def _build_case_model(work: WorkerData, number: int):
-    """Return the model of a case, by its number, or the error of its scene.
-
-    `work` is the data of the sweep.
-    """
+    """Return the model of the case `number` of the sweep `work`, or the PatchfemError that its invalid scene raises."""
     try:
         return work.sweep_scene.build_model(work.cases.assignments(number))
     except PatchfemError as error:

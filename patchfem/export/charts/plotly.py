@@ -81,7 +81,10 @@ def _make_vertical_line(position: float) -> Figure:
 
 
 def make_traces(panel: Panel) -> list[Figure]:
-    """Return the traces of a panel; those of a film have the same range of colours."""
+    """Return the curves or maps of a panel as traces, the data objects of plotly.js, which `axes` draws as well.
+
+    A film has a trace for each frame, all with the same range of colours.
+    """
     if panel.style in ("map", "film"):
         traces = [_make_map_trace(curve, panel.colour_label) for curve in panel.curves]
         if panel.style == "film":

@@ -127,7 +127,7 @@ def spread_indices(size: int, count: int) -> np.ndarray:
 
 
 def make_relative(answers: Answers, chart: Chart) -> Panel | None:
-    """Return the main measures divided by their values in the first case, against the only swept key.
+    """Return the main measures and those of the chart, divided by their values in the first case, against the only key.
 
     A band shows changes of up to 5 %.
     """
@@ -137,7 +137,7 @@ def make_relative(answers: Answers, chart: Chart) -> Panel | None:
         if view.others or not view.is_grid:
             continue
         x_axis, x = view.scale(view.axis)
-        for name in chart.y.split():
+        for name in (*MAIN_MEASURES, *chart.y.split()):
             if name not in answer.data:
                 continue
             values = view.split_lines(name).ravel()

@@ -63,9 +63,19 @@ class Block(NamedTuple):
 
 
 def make_blocks(pieces: Pieces) -> dict[str, Block]:
-    """Return both pieces and their interface as blocks.
+    """Return the meshes of both pieces and of their interface, with their fields, as blocks for a VTKHDF file.
 
-    The interface moves with the lower piece.
+    The interface is a line of segments whose displacement is that of the face of the lower piece.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        Displacement, stress and interface fields in f frames, in SI units.
+
+    Returns
+    -------
+    dict of str to Block
+        Blocks `lower`, `upper` and `interface`.
     """
     x = pieces.x
     fields = {"weight": pieces.weight[None]}

@@ -12,20 +12,23 @@ from ...campaigns import surface_pairs
 from ...campaigns.compare import SurfaceRuns
 from ...campaigns.surface_pairs import TableLine
 from ...core import PatchfemError
+from ...runs.results.result import patch_surface
 from ...surface.areal import level
 from ...surface.compare import compare
 from ...surface.compare.compare import COMPARE_DEFAULTS, Options
 from ...surface.compare.records import Comparison, Track
 from ...surface.profile import resample_evenly
 from ...surface.quantity import HALF_WIDTH_95
+from ...surface.roughness.parameters import abbott_curve
 from ...surface.spectrum import WAVE_BAND
 from ..answer import Answer, JsonObject, Remarks, Variables
 from ..rows import make_variables
+from ..runs import make_quantities
 from . import shared, worn
 from .shared import SURFACE_NAMES, build_answer, convert_quantities, make_band, make_maps
 
 CHARTED_QUANTITIES = ("worn_depth_mean", "amplitude_ratio")  # quantities of the charts of pairs
-MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
+N_ABBOTT_POINTS = 201  # points of each Abbott curve, which is smooth
 
 
 def answer_files(
@@ -86,7 +89,7 @@ def compare_with_scene(
     run_surfaces : callable
         Receives the paths of both traces, limited to their common part, and runs the scene with each.
     folder : Path
-        Receives surface_before.csv and surface_after.csv.
+        Folder NAME.partial, later NAME, that receives surface_before.csv and surface_after.csv.
 
     Returns
     -------
@@ -99,7 +102,7 @@ def compare_with_scene(
     """
     comparison = compare.compare_files(before, after, options)
     paths = pressing.write_common_traces(comparison, folder)
-    return _add_pressed(make_comparison_answer(comparison), run_surfaces(*paths))
+    return _add_pressed(make_comparison_answer(comparison), run_surfaces(*paths), folder)
 
 
 def make_comparison_answer(comparison: Comparison) -> Answer:
@@ -211,27 +214,43 @@ def _make_abbott(heights) -> Variables:
     known = [values[np.isfinite(values)] for values in heights]
     if not all(values.size for values in known):
         return {}
-    curves = [np.quantile(values, 1 - MATERIAL_RATIOS) for values in known]
+    before, after = (abbott_curve(values, N_ABBOTT_POINTS) for values in known)
     return make_variables(
-        "surface",
-        material_ratio=MATERIAL_RATIOS,
-        abbott_before=curves[0],
-        abbott_after=curves[1],
+        "surface", material_ratio=before[0], abbott_before=before[1], abbott_after=after[1]
     )
 
 
-def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
-    """Add the measures and pressures of a scene that was run with the surface before and after wear."""
-    pressed = runs.as_dict()
+def _add_pressed(answer: Answer, runs: SurfaceRuns, folder: Path) -> Answer:
+    """Add the measures and pressures of a scene that was run with the surface before and after wear.
+
+    `folder` has the traces. The messages of the runs then name it as it is called when the answer is complete.
+    """
     data = dict(answer.data)
-    for side, (places, stress) in runs.pressures().items():
-        columns = {f"x_pressed_{side}": places, f"pressure_{side}": stress}
+    warnings = []
+    notes = []
+    for side, result in runs.results.items():
+        x = patch_surface(result.patch, result.fields).x
+        stress = result.fields["normal_stress"][0]
+        columns = {f"x_pressed_{side}": x, f"pressure_{side}": stress}
         data |= make_variables("surface", **columns)
-    warnings = (*answer.remarks.warnings, *runs.failed, *pressed["warnings"])
+        for listed, texts in ((warnings, result.warnings), (notes, result.notes)):
+            listed += [f"{side}: {text}".replace(folder.name, folder.stem) for text in texts]
+
+    outcomes = {side: str(result.outcome) for side, result in runs.results.items()}
+    sides = {side: make_quantities(result.measures) for side, result in runs.results.items()}
+    pressed = {
+        "scene": runs.title,
+        "measures": shared.compare_measures(sides),
+        "failed": runs.failed,
+        "outcome": dict.fromkeys(SURFACE_NAMES) | outcomes,
+        "warnings": warnings,
+        "notes": notes,
+    }
+    warnings = (*answer.remarks.warnings, *runs.failed, *warnings)
     return replace(
         answer,
         data=data,
-        remarks=Remarks(warnings, answer.remarks.notes),
+        remarks=Remarks(warnings, (*answer.remarks.notes, *notes)),
         details=answer.details | {"pressed": pressed},
     )
 

@@ -13,6 +13,7 @@ import numpy as np
 from ... import __version__
 from ...surface.compare.records import Comparison, Track
 from ...surface.quantity import CONFIDENCE_LEVEL, Quantity
+from ...surface.spectrum import WAVE_BAND
 from .. import answer, quantities
 from ..answer import JsonObject, Remarks, Variables
 from ..rows import make_variables
@@ -35,11 +36,14 @@ INTERVALS_SENTENCE = (
     "more."
 )
 _SENTENCES = tomllib.loads(Path(__file__).with_name("sentences.toml").read_text(encoding="utf-8"))
+# measures of both runs that stand beside each other
+COMPARED_MEASURES: list[str] = _SENTENCES["measures"]
 MISSING_VALUE_REASONS: dict[str, str] = _SENTENCES["reasons"]
 MISSING_NUMBER_TEXT = "any amount"  # stands for a missing number
 # SI units of the numbers of findings other than lengths; of areas between traces, and of volumes between scans
-RATIO_NUMBERS = ("unworn", "scale", "low", "high", "gain", "significance", "sure")
-FINDING_NUMBER_UNITS = dict.fromkeys(RATIO_NUMBERS, "1")
+FINDING_NUMBER_UNITS = dict.fromkeys(
+    ("unworn", "scale", "low", "high", "gain", "significance", "sure"), "1"
+)
 AREA_OR_VOLUME_NUMBERS = ("grown", "lost", "area")
 
 
@@ -95,6 +99,19 @@ def format_value(name: str, quantity: Quantity) -> str:
 def is_known(quantity: Quantity | answer.Quantity | None) -> bool:
     """Return whether a quantity exists and has a value."""
     return quantity is not None and quantity.value is not None
+
+
+def compare_measures(
+    quantities_by_side: dict[str, answer.Quantities],
+) -> dict[str, dict[str, answer.Quantity | None]]:
+    """Return the COMPARED_MEASURES that a run before or after wear has, by name and side; None where one has no value."""
+    measures = {}
+    for name in COMPARED_MEASURES:
+        found = {side: quantities_by_side.get(side, {}).get(name) for side in SURFACE_NAMES}
+        pair = {side: one if is_known(one) else None for side, one in found.items()}
+        if any(pair.values()):
+            measures[name] = pair
+    return measures
 
 
 def describe_region(comparison: Comparison) -> str:
@@ -176,8 +193,10 @@ def describe_waves(ratio: Quantity | None) -> list[str]:
     elif ratio.low > 1 + RATIO_ROUND_OFF:
         change = "they are increased"
     text = format_value("amplitude_ratio", ratio)
+    shortest, longest = (1e6 * wave for wave in WAVE_BAND)
     return [
-        f"On the whole surface the waves from 60 to 110 um have {text} times their amplitude before wear: {change}."
+        f"On the whole surface the waves from {shortest:g} to {longest:g} um have {text} times their amplitude before "
+        f"wear: {change}."
     ]
 
 

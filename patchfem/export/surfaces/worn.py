@@ -31,21 +31,7 @@ MIN_SCATTER_BLOCKS = 10.0
 MIN_SHAPE_MISFIT_FRACTION = 0.1
 MIN_SHAPE_MISFIT_DEVIATIONS = 2.0
 PROPOSAL_FACTOR = 1.2  # ratio of the wear coefficient that a note proposes to the fitted one
-# measures of both runs that stand beside each other; the first three are in the verdict
-BEFORE_AND_AFTER_MEASURES = (
-    "contact_fraction",
-    "pressure_peak",
-    "loop_area",
-    "normal_stiffness",
-    "tangential_stiffness",
-    "approach",
-    "rotation",
-    "groove_amplitude",
-    "slip_amplitude",
-    "relative_displacement_amplitude",
-    "friction_force_peak",
-)
-N_VERDICT_MEASURES = 3
+N_VERDICT_MEASURES = 3  # first ones of COMPARED_MEASURES, which the verdict states
 # Hidden wear relative to the mean depth from which on the verdict states it.
 MIN_HIDDEN_WEAR_RATIO = 0.01
 BOTH_PIECES_NOTE = (
@@ -361,11 +347,12 @@ def make_wear_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     """Return the answer on the wear of a patch between two runs: its sentences, quantities and curves."""
     verdict = describe_wear(runs, wear)
     # Measures and warnings of the run before and of the run after.
+    named = dict(zip(SURFACE_NAMES, runs, strict=True))
+    compared = shared.compare_measures({side: run.answer.quantities for side, run in named.items()})
     sides = {}
     warnings = []
-    for side, run in zip(SURFACE_NAMES, runs, strict=True):
-        known = {name: run.answer.quantities.get(name) for name in BEFORE_AND_AFTER_MEASURES}
-        measures = {name: q for name, q in known.items() if shared.is_known(q)}
+    for side, run in named.items():
+        measures = {name: pair[side] for name, pair in compared.items() if pair[side]}
         outcome = run.answer.details.get("outcome")
         sides[side] = {"outcome": outcome, "cycles": run.cycles, "measures": measures}
         warnings += [f"{side}: {text}" for text in run.answer.remarks.warnings]
@@ -379,9 +366,6 @@ def make_wear_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
 
     # Both runs have the same coordinates, so that the second surface needs no alignment.
     zero = {"shift": Quantity(0.0, "m", low=0.0, high=0.0)}
-    stored = sides["before"]["measures"] | sides["after"]["measures"]
-    names = [name for name in BEFORE_AND_AFTER_MEASURES if name in stored]
-
     return build_answer(
         sources=[run.state.source for run in runs],
         words=shared.Words(verdict, tuple(warnings), (BOTH_PIECES_NOTE,)),
@@ -395,10 +379,7 @@ def make_wear_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
             "registration": zero | {"mirrored": False},
             "removed": dict.fromkeys(SURFACE_NAMES, 0),
             "runs": sides,
-            "measures": {
-                name: {side: sides[side]["measures"].get(name) for side in SURFACE_NAMES}
-                for name in names
-            },
+            "measures": compared,
             "notes": warnings,
         },
     )
@@ -446,7 +427,7 @@ def _find_place(run: PatchRun, number) -> str:
 def _describe_measures(runs: tuple[PatchRun, PatchRun]) -> list[str]:
     """Return the sentence with the main measures before and after; [] if there are none."""
     parts = []
-    for name in BEFORE_AND_AFTER_MEASURES[:N_VERDICT_MEASURES]:
+    for name in shared.COMPARED_MEASURES[:N_VERDICT_MEASURES]:
         pair = [run.answer.quantities.get(name) for run in runs]
         if all(shared.is_known(number) for number in pair):
             first, second = (quantities.format_quantity(name, number) for number in pair)

@@ -240,7 +240,7 @@ def slide_signs(a, b, weight, before, after, law):
     if sign_1 == sign_2:
         return mean
 
-    # Bonds without stretch lie between ends of opposite signs.
+    # Between ends of opposite signs one bond has no stretch. The sum over the bonds is split at this bond.
     span = before.last - before.first
     place = min(max(-before.first / span, 0.0), 1.0)
     age = mix(a.first.age, a.last.age, place)

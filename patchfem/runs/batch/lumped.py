@@ -312,10 +312,11 @@ def refine(group: Group) -> Iterator[tuple[np.ndarray, Refined]]:
 
 
 def find_repeat_error(group: Group, same: float) -> np.ndarray:
-    """Return the relative error (n,) of a motion that is not computed further because it repeats.
+    """Return the relative error (n,) that is due to the cycles which are not computed because the motion repeats.
 
-    A cycle differs from the one before by at most `same`, relative to the range of the motion. The differences of the
-    cycles left out decrease at least as fast as the mode rings down, so that their sum is that of a geometric series.
+    The last computed cycle differs from the one before by at most `same`, relative to the range of the motion. The
+    differences of the others decrease at least as fast as the mode rings down, so that their sum is that of a geometric
+    series.
     """
     decrease = -np.expm1(-np.pi * group.read(Number.DAMPING) / group.read(Number.OMEGA))
     return same / np.maximum(decrease, 1 / group.read(Number.CYCLES))
@@ -567,7 +568,7 @@ def _stick_tolerance(group: Group) -> np.ndarray:
     """Return the largest slip amplitude (n,) [m] of a sticking interface; -1 of a law that never sticks."""
     numbers = group.cases.numbers.T
     if not group.stick_stiffness.any():
-        return np.where(numbers[0] == Law.COULOMB, 0.0, -1.0)
+        return np.where(numbers[LawNumber.LAW] == Law.COULOMB, 0.0, -1.0)
     return MAX_STICKING_SLIP_RATIO * numbers[LawNumber.LIMIT] / group.stick_stiffness
 
 

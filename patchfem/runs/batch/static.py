@@ -10,7 +10,7 @@ from time import process_time
 
 import numpy as np
 
-from ...core import Measure, Outcome, compute_allowed_error
+from ...core import Measure, Outcome
 from ...model.model import Model
 from ...model.similar_models import SimilarModels
 from .. import findings
@@ -124,11 +124,9 @@ def _insert_findings(model: Model, batch: Batch, results: CaseResults) -> None:
     """Store why cases miss their tolerance, with the measure that misses it most; `model` has the tolerance."""
     names = list(batch.values)
     tolerance = model.accuracy.tolerance
-    ratios = np.zeros((len(names), len(results)))
-    for row, name in zip(ratios, names):
-        allowed = compute_allowed_error(tolerance, batch.values[name], batch.floors[name])
-        np.divide(batch.errors[name], allowed, out=row, where=allowed > 0)
-    ratios = np.nan_to_num(ratios)
+    columns = (batch.values, batch.errors, batch.floors)
+    table = np.array([[part[name] for name in names] for part in columns])
+    ratios = measures.compute_error_ratios(tolerance, *table)
 
     is_missed = (ratios > 1).any(axis=0) & (batch.outcome != OutcomeCode.FAILED)
     for case in np.flatnonzero(is_missed).tolist():

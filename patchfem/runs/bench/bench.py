@@ -78,7 +78,7 @@ class BenchRun(SlideHistories):
         )
 
 
-def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) -> BenchRun:
+def run_bench(model, patch, steps: int, n_frames: int = 0, path=None, **settings) -> BenchRun:
     """Compute the friction response of a model to its prescribed displacement.
 
     Parameters
@@ -89,7 +89,7 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
         None for a single point ([normal]).
     steps : int
         Steps per cycle.
-    frames : int
+    n_frames : int
         Number of output frames of the fields.
     path : tuple, optional
         Displacement path in the form of `SlidePath.samples`; default: the path of the model.
@@ -110,7 +110,7 @@ def run_bench(model, patch, steps: int, frames: int = 0, path=None, **settings) 
     time, slide, first, omega = sample_path(model, steps, path)
     engine = choose_bench_engine(model, slide, settings.pop("choice", None))
     engine = replace(engine, has_half_cells=settings.pop("has_half_cells", False))
-    stored = _choose_frames(slide.size, frames)
+    stored = _choose_frames(slide.size, n_frames)
     histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **settings))
     jumps = choose_reversal_force_rule(model) == "jumps"
 

@@ -38,16 +38,16 @@ MAX_FALL_GROWTH = 1e-8
 class Surface(NamedTuple):
     """Interface, or a band of its face.
 
-    - keys: effective keys of its law
-    - total: load [N] on the whole contact, to which stiffness and damping in the keys refer
-    - force: mean load of a point [N], or mean loads of the nodes (m,)
-    - soft: Patch whose pieces deform in shear, or None
-    - row (n,): slide per modal coordinate
-    - has_half_cells: whether an Iwan model has half of its cells, to estimate their error
-    - rise: load of the points at the start over their mean load
-    - lower: LowerPressure if the pressure belongs to the lower piece, or None
-    - bond_sum: sum over lists of bonds, or None
-    - limits (2, m): loads [N] that limit friction in slides to +x and to -x, if the law averages the pressure, or None
+    - keys: effective keys of its law.
+    - total: load [N] on the whole contact, to which stiffness and damping in the keys refer.
+    - force: mean load of a point [N], or mean loads of the nodes (m,).
+    - soft: Patch whose pieces deform in shear, or None.
+    - row (n,): slide per modal coordinate.
+    - has_half_cells: whether an Iwan model has half of its cells, to estimate their error.
+    - rise: load of the points at the start over their mean load.
+    - lower: LowerPressure if the pressure belongs to the lower piece, or None.
+    - bond_sum: sum over lists of bonds, or None.
+    - limits (2, m): loads [N] that limit friction in slides to +x and to -x, if the law averages the pressure, or None.
     """
 
     keys: object

@@ -15,9 +15,9 @@ import numpy as np
 class MasingHistory(NamedTuple):
     """Friction along a slide at k samples.
 
-    - force (k,): friction force [N]
-    - slip (k,): mean slip of the elements, weighted by their slip forces [m]
-    - work, loss (k,): work of the friction force and dissipated energy since the start [J]
+    - force (k,): friction force [N].
+    - slip (k,): mean slip of the elements, weighted by their slip forces [m].
+    - work, loss (k,): work of the friction force and dissipated energy since the start [J].
     """
 
     force: np.ndarray
@@ -29,8 +29,8 @@ class MasingHistory(NamedTuple):
 class Elements(NamedTuple):
     """Parallel elements.
 
-    - find_loop: function of amplitudes (k,) [m] that returns the `friction.SteadyLoop`s (k,)
-    - limit: force at which all elements slip [N]
+    - find_loop: function of amplitudes (k,) [m] that returns the `friction.SteadyLoop`s (k,).
+    - limit: force at which all elements slip [N].
     """
 
     find_loop: object

@@ -40,9 +40,9 @@ def find_climbed_grooves(model):
 class Softness(NamedTuple):
     """Properties of a law that decide how many shear modes it needs.
 
-    - length: displacement over which the force of a node grows to its limit [m]; 0 for rigid friction
-    - fall: steepest fall of the friction force over the slip, relative to its limit [1/m]
-    - max_modes: largest number of modes
+    - length: displacement over which the force of a node grows to its limit [m]; 0 for rigid friction.
+    - fall: steepest fall of the friction force over the slip, relative to its limit [1/m].
+    - max_modes: largest number of modes.
     """
 
     length: float

@@ -28,9 +28,8 @@ from .values import contact_reaches_steep_end, find_contact_edges
 # Largest number of contacts for which the meshes of many cases are graded: half of them equally spaced in the order of
 # their left ends, half in that of their right ends
 MAX_GRADED_CONTACTS = 48
-MAX_SEARCHED_CASES = (
-    256  # largest number of cases whose contacts are searched for before the meshes are chosen
-)
+# Largest number of cases whose contacts are searched for before the meshes are chosen
+MAX_SEARCHED_CASES = 256
 # Largest number of interface nodes of meshes that many cases share; a finer mesh slows down every case
 MAX_SHARED_NODES = 500
 MAX_CHUNK_VALUES = 4_000_000  # numbers of a temporary array of cases, columns and nodes, 32 MB
@@ -131,7 +130,8 @@ class OpenCases(NamedTuple):
 def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
     """Compute the static measures of all cases of a group, with errors within the tolerance if possible.
 
-    A case that cannot be solved, or misses the tolerance, has a reason (`cases.Reason`); it never stops the others.
+    A case that cannot be solved has an error (`Batch.messages`); one that misses the tolerance has its best values and an
+    excess above 1. Neither stops the others.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ class _CaseSolver:
             n_done = len(done.series)
             if not is_automatic:
                 return Verdict(np.inf, given[n_done - 1] if n_done <= len(given) else None)
-            finer = [body.refine() for body in done.series[-1].pair.meshes if body is not None]
+            finer = grids.halve_cells(done.series[-1].pair.meshes)
             is_last = finer[0].x.size > max_nodes
             is_last |= mesh_levels.is_too_expensive(self.patch_model, finer)
             is_judged = n_done > n_unjudged

@@ -15,32 +15,17 @@ import numpy as np
 from ... import contact
 from ...contact.gaps import ShapeProperties
 from ...contact.press_cases import Holders
-from ...core import NotConverged, PatchfemError
+from ...core import PatchfemError
 from ...model.gap import Gap
 from ...model.patch import PatchModel
 from ...scene.keys.types import Table
 from ..results.patch_rows import POSITIVE_MESH_MEASURES, Arrays
 
 
-class Reason(IntEnum):
-    """Code of a case in `Batch.reason`: why it has no values, or why they miss the tolerance.
-
-    - NONE: the case has values within the tolerance.
-    - MESH_LIMIT: the values are the best; their errors miss the tolerance, and a finer mesh would be too expensive.
-    - REFUSED: the load, the approach or the shapes cannot be computed with.
-    - NOT_CONVERGED: no contact set meets the contact conditions to round-off.
-    """
-
-    NONE = 0
-    MESH_LIMIT = 1
-    REFUSED = 2
-    NOT_CONVERGED = 3
-
-
 class OutcomeCode(IntEnum):
     """Code of a case in `Batch.outcome`.
 
-    The first three are those of the `Outcome` of a run. FAILED cases have no values, and `Batch.reason` tells why.
+    The first three are those of the `Outcome` of a run. FAILED cases have no values, but an error in `Batch.messages`.
     """
 
     DONE = 0
@@ -247,7 +232,7 @@ class Batch:
       failed or the measure is unbounded; an error is NaN without an estimate.
     - excess (n,): largest ratio of error to allowed error of the measures for which the mesh is refined; above 1 the
       case misses its tolerance, and a case that failed has inf.
-    - outcome (n,) of int8: `OutcomeCode`; reason (n,) of int8: `Reason`.
+    - outcome (n,) of int8: `OutcomeCode`.
     - facts (f, n): rows `MeshFact` of the finest mesh of each case.
     - messages: error of each case that failed, by its number; a single run raises it.
     """
@@ -257,7 +242,6 @@ class Batch:
     floors: Arrays
     excess: np.ndarray
     outcome: np.ndarray
-    reason: np.ndarray
     facts: np.ndarray
     messages: dict[int, PatchfemError] = field(default_factory=dict)
 
@@ -273,7 +257,6 @@ class Batch:
             {},
             np.full(count, np.inf),
             np.full(count, OutcomeCode.FAILED, np.int8),
-            np.full(count, Reason.NOT_CONVERGED, np.int8),
             np.zeros((len(MeshFact), count)),
         )
 
@@ -297,7 +280,6 @@ class Batch:
 
         self.excess[cases] = measures.excess[rows]
         self.facts[:, cases] = measures.facts[:, rows]
-        self.reason[cases] = np.where(measures.excess[rows] > 1, Reason.MESH_LIMIT, Reason.NONE)
         self.outcome[cases] = OutcomeCode.DONE
         for name in POSITIVE_MESH_MEASURES:
             is_unknown = (self.errors[name][cases] > 0) & (
@@ -311,5 +293,3 @@ class Batch:
         """Store the error of a case that has no measures yet."""
         if np.isinf(self.excess[number]):
             self.messages[number] = error
-            is_numerical = isinstance(error, NotConverged)
-            self.reason[number] = Reason.NOT_CONVERGED if is_numerical else Reason.REFUSED

@@ -45,15 +45,16 @@ def solve_contact_on_meshes(interface, tolerance: float) -> Patches:
 
 
 def group_interfaces_with_coarse_mesh(model) -> list[tuple[int, ...]]:
-    """Return groups of indices of the interfaces whose motion depends on their mesh and that have a coarser one.
+    """Group the indices of the interfaces that need a comparison run on a coarser mesh.
 
-    Interfaces with equal patches share one solution, and are a group.
+    A group has all interfaces with equal patches, which share one solution. Left out are interfaces whose motion follows
+    from their load alone, and those without a coarser mesh.
     """
-    out = {}
+    groups = {}
     for face in solve_interface_patches(model):
         if face.depends_on_pressure and face.patches[1] is not None:
-            out.setdefault(face.patches, []).append(face.number)
-    return [tuple(numbers) for numbers in out.values()]
+            groups.setdefault(face.patches, []).append(face.number)
+    return [tuple(numbers) for numbers in groups.values()]
 
 
 def has_error_meshes(model) -> bool:

@@ -557,6 +557,14 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     return grids
 
 
+def halve_cells(bodies, count: int = 1) -> list:
+    """Return the meshes of the pieces with all cells halved `count` times, without the missing one of identical pieces."""
+    bodies = [body for body in bodies if body is not None]
+    for _ in range(count):
+        bodies = [body.refine() for body in bodies]
+    return bodies
+
+
 def divide_piece_into_rows(
     piece, first_row: float, last_row: float, coating_row: float, max_row: float, growth: float
 ) -> tuple[np.ndarray, int]:

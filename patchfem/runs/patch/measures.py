@@ -147,11 +147,26 @@ class StaticEstimates(NamedTuple):
         Measures without value or error do not count. `tolerance` is relative, and `length` [m] that of the interface.
         """
         rows = [self.names.index(name) for name in MESH_MEASURES]
-        allowed = compute_allowed_error(tolerance, self.values, self.floors(tolerance, length))[
-            rows
-        ]
-        ratios = self.errors[rows] / np.maximum(allowed, 1e-300)
-        return np.nan_to_num(ratios).max(axis=0)
+        floors = self.floors(tolerance, length)[rows]
+        ratios = compute_error_ratios(tolerance, self.values[rows], self.errors[rows], floors)
+        return ratios.max(axis=0)
+
+
+def compute_error_ratios(tolerance: float, values, errors, floors) -> np.ndarray:
+    """Return the ratios (k, n) of the errors of k measures of n cases to those that a tolerance allows.
+
+    The rule is that of `core.Measure.error_ratio`. A measure without value or error has the ratio 0.
+
+    Parameters
+    ----------
+    tolerance : float
+        Relative tolerance.
+    values, errors, floors : (k, n) ndarray
+        Measures with their errors and absolute floors, in the unit of each measure; NaN where there is none.
+    """
+    allowed = np.maximum(compute_allowed_error(tolerance, values, floors), 1e-300)
+    with np.errstate(over="ignore"):  # of a value of 0 without a floor
+        return np.nan_to_num(errors / allowed)
 
 
 def list_larger_terms(

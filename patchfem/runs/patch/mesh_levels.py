@@ -20,6 +20,7 @@ from .grids import (
     MIN_NESTED_MESHES,
     choose_density,
     find_contacts_alone,
+    halve_cells,
     make_base_grids,
     make_grids,
     predict_condensing_seconds,
@@ -167,10 +168,7 @@ def condense_for_contacts(patch_models) -> CondensedPair | None:
     if not first.mesh.is_automatic:
         return condense(first, *make_piece_meshes(first))
     layout, _ = search_layout(first, partial(find_contacts_alone, patch_models))
-    bodies = make_grids(first, layout)
-    for _ in range(MIN_NESTED_MESHES - 1):
-        bodies = [body.refine() for body in bodies]
-    return condense(first, *bodies)
+    return condense(first, *halve_cells(make_grids(first, layout), MIN_NESTED_MESHES - 1))
 
 
 def solve_on_refined_meshes(
@@ -210,8 +208,7 @@ def solve_on_refined_meshes(
     if with_errors or solved:
         patches, _ = refine(meshes.press, bodies, meshes.judge, NO_LIMIT)
     else:
-        for _ in range(MIN_NESTED_MESHES - 1):
-            bodies = [body.refine() for body in bodies]
+        bodies = halve_cells(bodies, MIN_NESTED_MESHES - 1)
         patches = (meshes.solve(bodies, None, keep_factors=True),)
     if len(patches) < MIN_NESTED_MESHES:
         missing = (MIN_NESTED_MESHES - len(patches)) * [None]
@@ -293,7 +290,7 @@ class _PatchMeshes:
         Points replace a mesh that would take longer than those of a rig. Where they do not converge, they would not do so
         beside the next mesh either.
         """
-        finer = _halve_meshes(patches[0])
+        finer = halve_cells(patches[0].pair.meshes)
         is_expensive = (
             predict_condensing_seconds(finer) > COARSE_GRID_DENSITY.max_condensing_seconds
         )
@@ -309,7 +306,7 @@ class _PatchMeshes:
 
     def judge(self, patches: Patches, excesses) -> Verdict:
         """Decide whether a finer mesh follows; `patches` are solved, and `excesses` those of the meshes before."""
-        finer = _halve_meshes(patches[0])
+        finer = halve_cells(patches[0].pair.meshes)
         if len(patches) < MIN_NESTED_MESHES:
             return Verdict(inf, finer)
         if patches[0].pressure.outcome is Outcome.NO_CONTACT:
@@ -320,11 +317,6 @@ class _PatchMeshes:
                 return Verdict(excess)
             self.n_finer -= 1
         return Verdict(excess, finer)
-
-
-def _halve_meshes(patch: Patch) -> "list[piece_meshes.Mesh]":
-    """Return the meshes of a patch with cells half as long."""
-    return [mesh.refine() for mesh in patch.pair.meshes if mesh is not None]
 
 
 def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:
@@ -371,7 +363,7 @@ def needs_finer_mesh(patch_model, patches, tolerance: float) -> bool:
     tolerance : float
         The smaller tolerance.
     """
-    if is_too_expensive(patch_model, _halve_meshes(patches[0])):
+    if is_too_expensive(patch_model, halve_cells(patches[0].pair.meshes)):
         return False
     # Values are extrapolated where they miss the tolerance.
     patches = with_static_measures(patches, tolerance, patches[0].points)

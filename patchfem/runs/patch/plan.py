@@ -13,7 +13,7 @@ from ...model.model import Model
 from ...model.pieces import make_piece_meshes
 from ..results.patch_rows import Values
 from . import area, skin, store
-from .grids import MIN_NESTED_MESHES, make_base_grids
+from .grids import MIN_NESTED_MESHES, halve_cells, make_base_grids
 
 # Tolerance below which a contact that ends inside the interface or at a step needs another
 # refinement level.
@@ -37,9 +37,8 @@ def _predict_finest_mesh(patch_model, tolerance: float) -> "Sequence[piece_meshe
         return make_piece_meshes(patch_model.with_mesh(file=None))
     bodies, contact = make_base_grids(patch_model)
     has_edges = bool(patch_model.gap.step_edges or (contact is not None and contact.places))
-    for _ in range(MIN_NESTED_MESHES - 1 + (has_edges and tolerance < MAX_TOL_FOR_FOURTH_MESH)):
-        bodies = [body.refine() for body in bodies]
-    return bodies
+    has_fourth = has_edges and tolerance < MAX_TOL_FOR_FOURTH_MESH
+    return halve_cells(bodies, MIN_NESTED_MESHES - 1 + has_fourth)
 
 
 def count_unknowns(model: Model) -> dict[str, int]:

@@ -60,7 +60,7 @@ class Face(NamedTuple):
 
     def name_measure(self, name: str) -> str:
         """Return the name of a measure of this interface in the run, which has its number from the second one on."""
-        return add_interface_number(name, self.number) if self.number else name
+        return add_interface_number(name, self.number)
 
     @property
     def partial_slip(self) -> str:

@@ -1,6 +1,7 @@
 """Method of bond summation for a rig, and the limits of its bond list.
 
-In: a Model and its Numerics. Out: the EngineChoice of the bond summation (`choose_bond_summation`),
+In: a Model and its Numerics. Out: the EngineChoice of the bond summation (`choose_bond_summation`), and the refusal of time
+steps that do not resolve the vibration of the block on its bonds.
 """
 
 from dataclasses import replace

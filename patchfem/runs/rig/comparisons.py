@@ -91,10 +91,10 @@ def list_space_runs(
         coarser_runs.append(CoarserRuns((), estimate_sampling_errors, source="samples"))
 
     # On a coarser mesh the number of shear modes stays, so that only the mesh changes.
-    count = int(np.size(reduction.stiffness)) if has_modes else None
-    coarser_runs += _list_mesh_runs(model, numerics, beside, n_coarse, count)
+    n_modes = int(np.size(reduction.stiffness)) if has_modes else None
+    coarser_runs += _list_mesh_runs(model, numerics, beside, n_coarse, n_modes)
     if has_modes:
-        fewer = replace(numerics, shear_modes=slip.shear_modes.comparison_mode_count(count))
+        fewer = replace(numerics, shear_modes=slip.shear_modes.comparison_mode_count(n_modes))
         coarser_runs.append(CoarserRuns((fewer,), second_order_errors, beside, "modes"))
 
     # The cells of an Iwan model represent its continuous density to order 2.
@@ -125,7 +125,7 @@ def _has_cells(model: Model) -> bool:
 
 
 def _list_mesh_runs(
-    model: Model, numerics: Numerics, beside: Numerics | None, n_coarse: int, count: int | None
+    model: Model, numerics: Numerics, beside: Numerics | None, n_coarse: int, n_modes: int | None
 ) -> ComparisonRuns:
     """List the comparison runs in which one patch of a model has coarser meshes: that of [contact], or of an interface.
 
@@ -142,14 +142,14 @@ def _list_mesh_runs(
         Settings of the run with which it is compared; None for the run itself.
     n_coarse : int
         Number of coarser meshes on which the patch of [contact] is solved.
-    count : int or None
+    n_modes : int or None
         Number of shear modes of the run; None without shear modes.
     """
     has_cells = model.patch is not None and model.patch.area is not None and beside is not None
     is_averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
     coarser_runs = []
     if n_coarse and (model.motion_depends_on_mesh or is_averaged):
-        has_elements = bool(model.partial_slip) and count is None
+        has_elements = bool(model.partial_slip) and n_modes is None
         rule = _choose_mesh_rule(model.side, has_elements=has_elements)
         if has_cells and rule is second_order_errors:
             rule = estimate_convergence_errors
@@ -157,7 +157,7 @@ def _list_mesh_runs(
         is_single = rule is second_order_errors or (has_elements and model.rig is not None)
         n_meshes = 1 if is_single or beside is None else 2
         levels = range(1, 1 + min(n_coarse, n_meshes))
-        modes = numerics.shear_modes if count is None else count
+        modes = numerics.shear_modes if n_modes is None else n_modes
         runs = tuple(replace(numerics, coarse_patch=k, shear_modes=modes) for k in levels)
         coarser_runs.append(CoarserRuns(runs, rule, beside, "mesh"))
     # The module of interfaces with patches is loaded only for them.
@@ -165,7 +165,7 @@ def _list_mesh_runs(
     for interfaces in groups:
         interface = model.rig.friction.interfaces[interfaces[0]]
         rule = _choose_mesh_rule(
-            interface.patch.gap.side, has_elements=bool(interface.partial_slip) and count is None
+            interface.patch.gap.side, has_elements=bool(interface.partial_slip) and n_modes is None
         )
         coarse = replace(numerics, meshed=interfaces)
         coarser_runs.append(CoarserRuns((coarse,), rule, beside, "mesh"))
@@ -239,8 +239,8 @@ def list_joint_runs(inputs, space_runs: ComparisonRuns) -> ComparisonRuns:
     measure is its error. The run has the steps of the run on a coarser mesh, the first one of `space_runs`. `inputs` are the
     RunInputs of the run.
     """
-    for kind in space_runs:
-        if inputs.stiffer is not None and kind.runs and kind.runs[0].coarse_patch:
-            stiffer = replace(kind.runs[0], coarse_patch=0, stiffer_joint=True)
-            return [CoarserRuns((stiffer,), compute_absolute_changes, kind.reference, "mesh")]
+    for coarser in space_runs if inputs.stiffer is not None else ():
+        if coarser.runs and coarser.runs[0].coarse_patch:
+            stiffer = replace(coarser.runs[0], coarse_patch=0, stiffer_joint=True)
+            return [CoarserRuns((stiffer,), compute_absolute_changes, coarser.reference, "mesh")]
     return []

@@ -220,6 +220,21 @@ def steps_per_cycle(model: Model) -> int:
     return min(max(steps, 100), MAX_MARCH_STEPS_PER_CYCLE)
 
 
+def make_bench_numerics(model: Model, steps: int, engine: "bench_engine.BenchEngine") -> Numerics:
+    """Return the Numerics of a bench.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the bench.
+    steps : int
+        Steps per cycle.
+    engine : BenchEngine
+        Method of the friction force.
+    """
+    return Numerics(BENCH.name, steps, model.slide.cycles, 1, None, engine.choice)
+
+
 def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     """Choose the engine and the numerical settings of a run of a rig.
 
@@ -245,8 +260,7 @@ def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     if engine is BENCH:
         steps = bench_engine.steps_per_cycle(model)
         slide = bench_engine.sample_path(model, steps).slide
-        choice = bench_engine.choose_bench_engine(model, slide).choice
-        return Numerics(BENCH.name, steps, model.slide.cycles, 1, None, choice)
+        return make_bench_numerics(model, steps, bench_engine.choose_bench_engine(model, slide))
     drive = rig.drive
     cycles = drive.cycles
     window = int(max(1, min(10, (cycles + WHOLE_CYCLE_TOL) // 10)))

@@ -360,14 +360,14 @@ def _find_level_unit(rig) -> tuple[str, float]:
     return ("N", rig.modes.mass) if rig.drive.kind == "force" else ("m s-2", 1.0)
 
 
-def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
+def run_levels(evaluator, n_frames: int = 0, progress=None) -> tuple[Any, Fields]:
     """Run the levels of a drive in order, each from the final state of the previous one.
 
     Parameters
     ----------
     evaluator : RunEvaluator
         Integrates and evaluates each level. Its model has the levels of the drive.
-    frames : int
+    n_frames : int
         Number of snapshots of the interface in the last cycle of the last level.
     progress : callable, optional
         Callback for the completed fraction of all levels.
@@ -413,7 +413,7 @@ def run_levels(evaluator, frames: int = 0, progress=None) -> tuple[Any, Fields]:
     report = None if progress is None else partial(_report_fraction, progress, runs, n_levels)
     for amplitude in amplitudes:
         is_last = len(runs) + 1 == n_levels
-        run, result = solve(amplitude, runs[-1] if runs else None, frames * is_last, report)
+        run, result = solve(amplitude, runs[-1] if runs else None, n_frames * is_last, report)
         runs.append(run)
         level_results.append(result)
         if run.outcome is not None:
@@ -541,12 +541,12 @@ class RunEvaluator:
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.stick_tolerance = 0.0 if self.creeps else stick_tolerance
 
-    def solve(self, frames: int, progress, prepare: Values) -> Solution:
+    def solve(self, n_frames: int, progress, prepare: Values) -> Solution:
         """Compute the motion of the rig, for one drive level after another, and its Solution.
 
         Parameters
         ----------
-        frames : int
+        n_frames : int
             Number of snapshots of the interface in the last cycle.
         progress : callable or None
             Callback for the completed fraction.
@@ -557,9 +557,9 @@ class RunEvaluator:
         drive = self.model.rig.drive
         fields = {}
         if drive.levels.amplitudes:
-            run, fields = run_levels(self, frames, progress)
+            run, fields = run_levels(self, n_frames, progress)
         else:
-            run = self.integrate(drive.signal, self.numerics.cycles, None, frames, progress)
+            run = self.integrate(drive.signal, self.numerics.cycles, None, n_frames, progress)
         return self.make_solution(run, measure_cpu_time() - begin, prepare=prepare, **fields)
 
     def evaluate_measures(self, run, drive=None, ledger=None, *, stuck: bool = False) -> Values:

@@ -99,7 +99,7 @@ class ElementSnapshot(NamedTuple):
 
 
 def run_from_event_to_event(
-    model, numerics, patch, frames: int = 0, say=None, progress=None
+    model, numerics, patch, n_frames: int = 0, say=None, progress=None
 ) -> Solution:
     """Compute the motion of a rig from event to event, for one drive level after another.
 
@@ -111,7 +111,7 @@ def run_from_event_to_event(
         Step tolerance, cycles and window.
     patch : Patch or None
         None under [normal] or between masses.
-    frames : int
+    n_frames : int
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
@@ -124,8 +124,8 @@ def run_from_event_to_event(
     begin = process_time()
     joints = make_joints(model, numerics, patch)
     prepare = {"reduce": process_time() - begin}
-    compiled.load_compiled_module("hybrid.engine_kernels", say)
-    return LumpedEvaluator(model, numerics, patch, joints).solve(frames, progress, prepare)
+    compiled.report_compilation_to(say)
+    return LumpedEvaluator(model, numerics, patch, joints).solve(n_frames, progress, prepare)
 
 
 class LumpedEvaluator(RunEvaluator):
@@ -138,7 +138,7 @@ class LumpedEvaluator(RunEvaluator):
         self.bands_slide_apart = model.rig.friction.bands_slide_apart and self.has_friction
 
     def integrate(
-        self, drive, cycles: float, before: EngineRun | None, frames: int = 0, progress=None
+        self, drive, cycles: float, before: EngineRun | None, n_frames: int = 0, progress=None
     ) -> EngineRun:
         """Integrate the motion under a drive from the end of another run.
 
@@ -150,12 +150,12 @@ class LumpedEvaluator(RunEvaluator):
             Number of cycles of the drive.
         before : EngineRun or None
             Run from whose end the motion goes on, or None for the start of the rig.
-        frames : int
+        n_frames : int
             Number of snapshots of the interface in the last cycle.
         progress : callable, optional
             Callback for the completed fraction.
         """
-        run = self.resume(drive, cycles, None if before is None else before.end, frames)
+        run = self.resume(drive, cycles, None if before is None else before.end, n_frames)
         if not self.model.rig.drive.levels.amplitudes:
             run = remove_incomplete_cycle(run)
         # Measures of the whole run add up from level to level.
@@ -166,7 +166,7 @@ class LumpedEvaluator(RunEvaluator):
             progress(1.0)
         return run
 
-    def resume(self, drive, cycles: float, state: State | None, frames: int = 0) -> EngineRun:
+    def resume(self, drive, cycles: float, state: State | None, n_frames: int = 0) -> EngineRun:
         """Integrate the motion under a drive.
 
         Parameters
@@ -177,11 +177,11 @@ class LumpedEvaluator(RunEvaluator):
             Number of cycles of the drive.
         state : State or None
             State from which the motion goes on, or None for the start of the rig.
-        frames : int
+        n_frames : int
             Number of snapshots of the elements in the last cycle.
         """
         travel = find_travel(self.model.rig)
-        times = choose_sample_times(self.numerics, drive, cycles, frames)
+        times = choose_sample_times(self.numerics, drive, cycles, n_frames)
         motion = self._run(drive, cycles, times.samples, travel, state)
 
         # Why the motion ended early, as an outcome or as an error.
@@ -334,7 +334,7 @@ class LumpedEvaluator(RunEvaluator):
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
         """Return the measures of the engine.
 
-        Strips that slide independently are parts of a single interface, whose loop of the mean displacement is that of
+        Bands that slide independently are parts of a single interface, whose loop of the mean displacement is that of
         samples.
 
         Parameters
@@ -444,8 +444,8 @@ def _list_remembered_slides(state: State, interface: int) -> np.ndarray:
     return memory[Memory.ORIGIN] + np.append(0.0, stack)
 
 
-def choose_sample_times(numerics, drive, cycles: float, frames: int = 0) -> SampleTimes:
-    """Choose the times of the samples and of `frames` snapshots.
+def choose_sample_times(numerics, drive, cycles: float, n_frames: int = 0) -> SampleTimes:
+    """Choose the times of the samples and of `n_frames` snapshots.
 
     Parameters
     ----------
@@ -455,7 +455,7 @@ def choose_sample_times(numerics, drive, cycles: float, frames: int = 0) -> Samp
         Drive, whose period divides the run into cycles.
     cycles : float
         Number of cycles of the drive in the run.
-    frames : int
+    n_frames : int
         Number of snapshots in the last cycle.
     """
     period = drive.period
@@ -477,7 +477,7 @@ def choose_sample_times(numerics, drive, cycles: float, frames: int = 0) -> Samp
 
     # A snapshot is taken at a sample, where all histories have a value.
     begin = max(0.0, end - period)
-    at = begin + (end - begin) * (1 + np.arange(frames)) / max(frames, 1)
+    at = begin + (end - begin) * (1 + np.arange(n_frames)) / max(n_frames, 1)
     nearest = np.abs(late[:, None] - at).argmin(axis=0)
     return SampleTimes(np.append(early, late), late[nearest], window_start)
 

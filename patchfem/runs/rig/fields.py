@@ -64,22 +64,17 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     if has_nodes or (has_shear and model.grooves is not None):
         tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
-        reduction = getattr(solution.contact, "reduction", None)
-        length = (
-            0.0 if reduction is None else friction.record.make_law(f, patch.pressure.load).length
-        )
+        length = friction.record.make_law(f, patch.pressure.load).length
+        elements = (solution.contact.reduction, length)
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
-        return _make_element_frames(
-            patch, f.static, (reduction, length), list_frames("time"), states
-        )
+        return _make_element_frames(patch, f.static, elements, list_frames("time"), states)
     else:
         force = list_frames("force")
         tau = np.outer(force / patch.pressure.load, sigma)
         if f is not None and law_has_trait(f.law, "averaged"):
             tau = averaged_law.distribute_slip_force(f, patch, force, np.zeros(force.size))
         local = np.repeat(list_frames("slip")[:, None], sigma.size, axis=1)
-    rule = SlipRule()
-    return make_interface_frames(patch, list_frames("time"), tau, local, list_frames("slide"), rule)
+    return make_interface_frames(patch, list_frames("time"), tau, local, list_frames("slide"))
 
 
 def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ...]:
@@ -115,7 +110,9 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
     return tuple(out)
 
 
-def _make_element_frames(patch, static: float, elements: tuple, time, states) -> Arrays:
+def _make_element_frames(
+    patch, static: float, elements: "tuple[slip.shear_modes.JenkinsSet, float]", time, states
+) -> Arrays:
     """Return the fields of an interface whose pieces deform in shear, from the stretches of its parallel elements.
 
     Parameters
@@ -131,8 +128,8 @@ def _make_element_frames(patch, static: float, elements: tuple, time, states) ->
     states : list of tuple
         Slide [m] and stretches (t,) [m] in each frame.
     """
-    reduction, length = elements
-    tau, local = slip.fields.compute_element_fields(patch, reduction, states, length)
+    jenkins_set, length = elements
+    tau, local = slip.fields.compute_element_fields(patch, jenkins_set, states, length)
     # The tractions of the cells of a face are interpolated, so that they do not reach their limits exactly.
     limit = None if patch.model.area is not None else static * patch.pressure.sigma_n
     slide = np.array([slide for slide, _ in states])

@@ -9,7 +9,7 @@ from time import process_time
 
 import numpy as np
 
-from ...core import Outcome
+from ...core import Outcome, add_interface_number
 from ...effects import law_has_trait
 from ...response.loops import CycleLoop
 from ...response.measures import Values, bound_sampling_errors, compute_step_harmonic
@@ -32,7 +32,7 @@ from .evaluation import (
 MAX_HELD_MOVE = 1e-9
 
 
-def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+def march_in_time(model, numerics, patch, n_frames: int = 0, say=None, progress=None) -> Solution:
     """Integrate the motion of a rig in time steps and evaluate its measures, without errors from coarse runs.
 
     Parameters
@@ -43,7 +43,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
         Steps per cycle, cycles and window.
     patch : Patch or None
         None under [normal] and between masses.
-    frames : int
+    n_frames : int
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
@@ -53,7 +53,7 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     reduced = process_time() - begin
     engine.load_kernels(contact, say)
     prepare = {"reduce": reduced, "compiled_code": process_time() - begin - reduced}
-    return MarchEvaluator(model, numerics, patch, contact).solve(frames, progress, prepare)
+    return MarchEvaluator(model, numerics, patch, contact).solve(n_frames, progress, prepare)
 
 
 class MarchEvaluator(RunEvaluator):
@@ -69,7 +69,7 @@ class MarchEvaluator(RunEvaluator):
         super().__init__(model, numerics, patch, contact, stick_tolerance)
 
     def integrate(
-        self, drive, cycles: float, before: engine.Motion | None, frames: int = 0, progress=None
+        self, drive, cycles: float, before: engine.Motion | None, n_frames: int = 0, progress=None
     ) -> engine.Motion:
         """Integrate the motion under a drive from the end of another run.
 
@@ -81,7 +81,7 @@ class MarchEvaluator(RunEvaluator):
             Number of cycles of the drive.
         before : time_steps.time_march.Motion or None
             Run from whose end the motion goes on, or None for the start of the rig.
-        frames : int
+        n_frames : int
             Number of snapshots of the interface in the last cycle.
         progress : callable, optional
             Callback for the completed fraction.
@@ -100,7 +100,7 @@ class MarchEvaluator(RunEvaluator):
             window=numerics.window,
             travel=travel,
             start=rig.start if before is None else before.end,
-            frames=0 if slide_apart and not self.model.partial_slip else frames,
+            frames=0 if slide_apart and not self.model.partial_slip else n_frames,
             keeps_samples=numerics.whole,
             progress=progress,
         )
@@ -149,8 +149,8 @@ class MarchEvaluator(RunEvaluator):
             size = np.max(np.abs(window.modal) @ np.abs(point_set.row))
             rests = np.abs(np.diff(slide)) <= MAX_HELD_MOVE * size
             if self.contact.is_rigid(point_set) and (rests[:-1] > rests[1:]).any():
-                number = f"_{k + 1}" if k else ""
-                peaks[f"friction_force_peak{number}"] = float(point_set.law.limits.sum())
+                name = add_interface_number("friction_force_peak", k)
+                peaks[name] = float(point_set.law.limits.sum())
         return peaks
 
     def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:

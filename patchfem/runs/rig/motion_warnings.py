@@ -30,9 +30,8 @@ from ..results.notes import LAW_NOTES, LAW_WARNINGS
 from . import joints
 from .engines import ENGINES, find_obstacle_of_map
 
-N_STEADY_CHECK_CYCLES = (
-    4  # Cycles that are added to see whether the last loop of a bench is steady.
-)
+# Number of cycles that are added to see whether the last loop of a bench is steady.
+N_STEADY_CHECK_CYCLES = 4
 SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 # Speed at half the friction limit of a law that creeps, relative to its reference speed: the inverse of tanh at 1/2.
 HALF_LIMIT_SPEED_RATIO = 0.5493

@@ -60,7 +60,7 @@ def stuck_interface_stiffness(chain: Chain, index: int = 0) -> float:
 def stuck_stiffnesses(rig, chain: Chain) -> np.ndarray:
     """Return the tangential stiffness (i,) [N/m] of each stuck interface of a rig.
 
-    Strips that slide apart have equal parts of the stiffness of their patch. Without friction the stiffness is inf. A
+    Bands that slide apart have equal parts of the stiffness of their patch. Without friction the stiffness is inf. A
     patch that was solved to subtract a bolted joint has its own stiffness instead of that of the chain.
     """
     bolted = rig.structure.bolted
@@ -116,7 +116,7 @@ def count_unknowns(model: Model) -> dict[str, int]:
 
 
 def find_interface_load(model: Model, interface) -> float:
-    """Return the normal load [N] on an interface (default: on the whole model)."""
+    """Return the normal load [N] on an interface; that of the model for an interface without a load of its own."""
     return model.nominal_load if interface.load is None else interface.load
 
 

@@ -35,7 +35,6 @@ from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, 
 from . import bond_lists, comparisons, decays, event_to_event, flutter, march, slides
 from . import fields as interface_fields
 from .engines import (
-    BENCH,
     ENGINES,
     HYBRID,
     MARCH,
@@ -43,6 +42,7 @@ from .engines import (
     MIN_RELATIVE_STEP_ERROR,
     Numerics,
     choose_numerics,
+    make_bench_numerics,
 )
 from .evaluation import (
     Solution,
@@ -57,7 +57,7 @@ from .motion_warnings import collect_remarks
 from .steady import shooting
 
 
-def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+def solve_rig(model, numerics, patch, n_frames: int = 0, say=None, progress=None) -> Solution:
     """Compute the motion of a rig with the engine of its settings; the output is that of the gauge.
 
     Parameters
@@ -68,21 +68,21 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
         Numerical settings, including the name of the engine.
     patch : Patch or None
         None under [normal] and between masses.
-    frames : int
+    n_frames : int
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
     """
     # Only the module of this engine is loaded.
     if numerics.engine == "bench":
-        return slides.solve_slide(model, numerics, patch, frames, say, progress)
+        return slides.solve_slide(model, numerics, patch, n_frames, say, progress)
     if numerics.engine == "hybrid":
         run = event_to_event.run_from_event_to_event
     elif numerics.engine == "march":
         run = march.march_in_time
     else:
         run = shooting.solve_steady_motion
-    return replace_output_by_gauge(model, run(model, numerics, patch, frames, say, progress))
+    return replace_output_by_gauge(model, run(model, numerics, patch, n_frames, say, progress))
 
 
 class Runner:
@@ -141,7 +141,7 @@ class Runner:
         # The decay curve needs histories from the start of the run.
         return self._solve(model, replace(numerics, whole=self.is_release), patch)
 
-    def _solve(self, model, numerics: Numerics, patch, frames: int = 0, say=None) -> Solution:
+    def _solve(self, model, numerics: Numerics, patch, n_frames: int = 0, say=None) -> Solution:
         """Solve a rig, and report the completed fraction of all runs.
 
         Parameters
@@ -152,7 +152,7 @@ class Runner:
             Cycles, steps and other settings of the run.
         patch : Patch or None
             Solved patch.
-        frames : int
+        n_frames : int
             Number of frames of the fields in the last cycle.
         say : callable, optional
             Function that takes a line of text on the progress.
@@ -166,7 +166,7 @@ class Runner:
             if self.progress is not None:
                 self.progress(1 - left + share * fraction)
 
-        solution = solve_rig(model, numerics, patch, frames, say, report)
+        solution = solve_rig(model, numerics, patch, n_frames, say, report)
         self._done += share
         return solution
 
@@ -252,7 +252,7 @@ class CoupledRun:
         return settings._replace(shear_modes=size)
 
     def find_force_ratio(self) -> float:
-        """Return the largest ratio of friction force to mu_s N [1]; 0 under a load that varies."""
+        """Return the largest friction force, divided by the static limit mu_s N [1]; 0 if the load varies."""
         rig = self.model.rig
         varies = self.model.load_varies if rig is None else rig.friction.load_varies
         limit = 0.0
@@ -398,7 +398,7 @@ def estimate_slide_errors(model, patches, run: "bench.BenchRun", steps: int) -> 
         Source of the error, and errors by measure.
     """
     solution = slides.make_slide_solution(run)
-    numerics = Numerics(BENCH.name, steps, model.slide.cycles, 1, None, run.engine.choice)
+    numerics = make_bench_numerics(model, steps, run.engine)
     runs = comparisons.list_time_runs(numerics)
     runs += comparisons.list_space_runs(model, numerics, patches[0], len(patches) - 1, solution)
     return Runner(model, patches).estimate_errors(runs, solution)

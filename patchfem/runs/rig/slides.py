@@ -13,7 +13,9 @@ from .engines import Numerics
 from .evaluation import Solution
 
 
-def solve_slide(model, numerics: Numerics, patch, frames: int = 0, say=None, progress=None):
+def solve_slide(
+    model, numerics: Numerics, patch, n_frames: int = 0, say=None, progress=None
+) -> Solution:
     """Compute the friction of a bench along its prescribed slide, as the Solution of a motion.
 
     Its response has the histories of the whole path (`bench.BenchRun`), and its window those of the last cycle.
@@ -26,7 +28,7 @@ def solve_slide(model, numerics: Numerics, patch, frames: int = 0, say=None, pro
         Steps per cycle, and methods of bond summation and of shear.
     patch : Patch or None
         None for a single point.
-    frames : int
+    n_frames : int
         Number of frames of the fields.
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
@@ -38,7 +40,7 @@ def solve_slide(model, numerics: Numerics, patch, frames: int = 0, say=None, pro
         model,
         patch,
         numerics.steps,
-        frames,
+        n_frames,
         choice=numerics.choice,
         has_half_cells=numerics.has_half_cells,
         say=say,

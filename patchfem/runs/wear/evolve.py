@@ -292,9 +292,9 @@ def _most_worn_coating(model, depth) -> WornCoating:
 class WornPiece(NamedTuple):
     """Part of the wear that one piece of a patch has.
 
-    - piece: the piece
-    - name: "upper" or "lower"
-    - depth: largest depth that is worn off it [m]
+    - piece: the piece.
+    - name: "upper" or "lower".
+    - depth: largest depth that is worn off it [m].
     """
 
     piece: PatchPiece
@@ -305,7 +305,7 @@ class WornPiece(NamedTuple):
 def list_worn_pieces(model, depth) -> list[WornPiece]:
     """Return both pieces, each with its part of the largest worn depth [m], which the scene divides among them.
 
-    `depth` is the worn depth of both together, (m,) [m] or (s, m) for strips.
+    `depth` (m,) [m] is the worn depth of both together.
     """
     largest = float(depth.max(initial=0.0))
     share = model.wear.upper_share

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import surface
 from ...core import Measure, Outcome
 from ...response.outcome import judge_outcome
 from ...response.rows import AMPLITUDE
@@ -135,7 +136,7 @@ def bands_slide_independently(model) -> bool:
     return model.rig is not None and model.rig.friction.bands_slide_apart
 
 
-def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
+def compute_cycle_slip(model, patch, n_cycle_frames: int) -> CycleSlip:
     """Compute the slip path of the interface nodes in one periodic cycle of a model.
 
     Parameters
@@ -144,10 +145,10 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
         Model at the present wear.
     patch : Patch
         Patch at the present wear.
-    frames : int
+    n_cycle_frames : int
         Number of frames per cycle from which the path is computed, if the nodes do not slip alike.
     """
-    n_frames = 0 if slips_uniformly(model) else frames
+    n_frames = 0 if slips_uniformly(model) else n_cycle_frames
     if model.rig is None:
         n_frames *= max(1, round(model.slide.cycles or 1))
     settings = engines.choose_numerics(model)
@@ -358,10 +359,8 @@ def _integrate_node_slip(model, patch, nodes: _Cycle) -> tuple[np.ndarray, float
         )
     error = points.estimate_reversal_error(sigma * patch.pieces.interface.weight)
     if model.patch.area is not None and patch.pressure.load > 0:
-        from ...surface.areal import fill_nearest
-
         known = np.where(sigma > 0, points.path, np.nan).reshape(patch.shape)
-        return fill_nearest(known).ravel(), error
+        return surface.areal.fill_nearest(known).ravel(), error
     return points.path[_find_nearest_contact(patch.x, sigma > 0)], error
 
 

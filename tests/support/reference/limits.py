@@ -144,7 +144,8 @@ MEANINGS = {  # Feature of a combination that is neither a key nor a law -> its 
     "bonds that no force can move": "law nonlocal with reading 'report', -1 < `order` < 0 and `initial_bonds` > 0",
     "partial slip": "`[patch.shear]`, `patch.asperities.tangential_ratio` or `patch.holder.tangential_stiffness`",
     "shape on the lower piece": "`on` is `lower` in " + join_words(SHAPES, "or"),
-    "shapes on different pieces": "`on` is `upper` in one and `lower` in another of " + join_words(SHAPES, "and"),
+    "shapes on different pieces": "in a bench or a rig: `on` is `upper` in one and `lower` in another of "
+    + join_words(SHAPES, "and"),
     "grooves": "`[contact.grooves]` or `[normal.grooves]`, with `amplitude` > 0",
     "interface": "`[[structure.interface]]`",
 }  # fmt: skip
@@ -155,8 +156,9 @@ LAWS_TEXT = """\
 Every friction law runs with every effect, in a rig and on a bench: partial slip of elastic pieces, pressure over a face,
 bands that yaw, shapes on either piece, a load that oscillates, heave and pitch, grooves, nonlinear springs, several
 interfaces with or without patches, and wear. The rows below are the exceptions, whatever the law unless they name one.
-Methods `auto` and `march` run all of them. Methods `exact` and `harmonic` need a state of a fixed size; they refuse law
-nonlocal with another `order` than 1 or with reading 'report', and a motion that the message names.
+Method `auto` runs all of them. So does `march`, but for law 'coulomb' on grooves without partial slip, whose motion is
+computed from event to event. Methods `exact` and `harmonic` need a state of a fixed size; they refuse law nonlocal with
+another `order` than 1 or with reading 'report', and a motion that the message names.
 """
 
 

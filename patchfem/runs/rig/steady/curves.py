@@ -24,12 +24,14 @@ from ..evaluation import EXACT_RELATIVE_ERROR, Solution, replace_output_by_gauge
 MIN_VALUE_RATIO = 1e-3
 # Smallest interval that is halved, relative to its abscissa; it ends the refinement at a jump.
 MIN_INTERVAL_RATIO = 1e-6
+# Largest relative error of linear interpolation between the points of a response curve.
+INTERPOLATION_TOL = 0.01
 
 
 def sample_adaptively(
     compute: Callable[[float, tuple | None], tuple],
     abscissas,
-    tolerance: float = 0.01,
+    tolerance: float = INTERPOLATION_TOL,
     max_points: int = 2000,
 ) -> list[tuple]:
     """Sample a curve at adaptive points until linear interpolation meets a tolerance.
@@ -121,8 +123,6 @@ REASONS_OF_END = {
     "step": "no neighbouring motion was found there",
     "cost": "its motions take too many steps, because a law or a mode is much faster than the drive",
 }
-# Largest relative error of linear interpolation between the points of a response curve.
-INTERPOLATION_TOL = 0.01
 
 
 class CurvePoint(NamedTuple):

@@ -34,7 +34,6 @@ from ..event_to_event import LumpedEvaluator
 from ..joints import make_joints
 from .curves import (
     COLUMN_MEASURES,
-    INTERPOLATION_TOL,
     SENSED_COLUMNS,
     CurvePoint,
     ObservedMotion,
@@ -54,10 +53,6 @@ N_CYCLES_IN_GROOVES = 30
 RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
-MIN_STOP = 1e-9  # shortest stop that is counted, in periods
-MAX_BRACKET_STEPS = (
-    8  # steps, each twice as long as the one before, beyond which no maximum is looked for
-)
 # Relative distance from its friction limit at which an interface slips as a whole
 FULL_SLIP_TOL = 1e-9
 # Steps along a response curve over frequency
@@ -81,7 +76,7 @@ class ShootingFinder:
             numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
         )
         self.draws_curve = numerics.whole
-        compiled.load_compiled_module("hybrid.engine_kernels", say)
+        compiled.report_compilation_to(say)
         self.joints = make_joints(model, self.numerics, patch)
         self.may_fold = may_fold(model)
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
@@ -204,7 +199,7 @@ class ShootingFinder:
         )
 
     def compute_point_values(self, point: CurvePoint) -> Values:
-        """Return the measures of the motion of a curve point; {} without a steady motion there."""
+        """Return the measures of the steady motion at a curve point by name; {} if there is none."""
         motion = point.guess.motion if isinstance(point.guess, PathPoint) else point.guess
         try:
             if motion is None:
@@ -343,7 +338,7 @@ class ShootingFinder:
             return "slides" if laws else "no friction"
         if not any(is_rigid(law.law) for law in laws):
             return "sliding"
-        lasts = faces[:, Window.STUCK] > MIN_STOP * motion.period
+        lasts = faces[:, Window.STUCK] > periodic.MIN_STOP * motion.period
         n_stops = int((faces[:, Window.STARTS] * lasts).max())
         return f"{n_stops} stop{'s' * (n_stops != 1)}" if n_stops else "sliding"
 
@@ -356,8 +351,8 @@ class ShootingFinder:
         ----------
         drive : SineDrive
             Drive of the point.
-        guess : PeriodicMotion, optional
-            Neighbouring motion; from rest by default.
+        guess : PeriodicMotion or State, optional
+            Neighbouring motion, or its state; from rest by default.
         needs_stability : bool
             Whether the multipliers and the errors of the motion are needed.
         """
@@ -381,22 +376,14 @@ class ShootingFinder:
             return CurvePoint(drive, {}, {}, "unbounded", 1.0, False)
 
         # An interface sticks if it slips by no more than the tolerance.
-        values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
         slips = np.ptp(motion.run.record.get_face_extremes(Probe.SLIP), axis=1)
         slips = slips[: len(self.joints.laws)]
         is_stuck = bool((slips <= self.joints.stick_tolerance).all()) and not self.evaluator.creeps
         regime = self._name_regime(motion, is_stuck=is_stuck)
         is_stable = is_stuck or motion.is_stable
-        sizes = np.abs(motion.multipliers)
-        return CurvePoint(
-            drive=drive,
-            values={name: value for name, value in values.items() if np.isfinite(value)},
-            errors=estimate_point_errors(values, find_relative_error(motion)),
-            regime=regime if is_stable else f"{regime}, unstable",
-            multiplier=float(sizes.max()) if sizes.size else np.nan,
-            stable=is_stable,
-            guess=motion,
-        )
+        if not is_stable:
+            regime = f"{regime}, unstable"
+        return _make_curve_point(drive, motion, regime, motion, is_stable=is_stable)
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> ObservedMotion | None:
         """Compute what sensors see of the periodic motion under a drive, without errors; None if it is unbounded.
@@ -425,9 +412,9 @@ class ShootingFinder:
     def _compute_linear_point(self, drive) -> CurvePoint | None:
         """Return the point of a response curve of a linear rig in closed form, or None at an undamped resonance."""
         modes = self.modes
-        gauge = modes.output if modes.gauge is None else modes.gauge
         try:
-            receptance = compute_receptance(modes, drive.omega, [gauge, modes.output], modes.base)
+            rows = [modes.measured, modes.output]
+            receptance = compute_receptance(modes, drive.omega, rows, modes.base)
         except PatchfemError:
             return None
         at_gauge, at_output = receptance[0, :, 0] * modes.mass
@@ -458,7 +445,7 @@ class ShootingFinder:
         """Compute the response curve over frequency, by continuation if it may have folds or if that of Iwan's law is drawn.
 
         Other curves start with N_SWEEP_POINTS frequencies and the natural frequencies. Each point starts from the motion at
-        the previous one. The curve is refined until linear interpolation has an error of at most INTERPOLATION_TOL.
+        the previous one. The curve is refined by `sample_adaptively`.
         """
         if self.follows_curve:
             return self._follow_curve(drive)
@@ -480,7 +467,7 @@ class ShootingFinder:
             return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
 
         frequencies = choose_start_frequencies(self.modes, drive)
-        samples = sample_adaptively(sample, frequencies, INTERPOLATION_TOL)
+        samples = sample_adaptively(sample, frequencies)
         return ResponseCurve([point for _, point in samples])
 
     def _bracket_peaks(self, drive) -> list[CurvePoint]:
@@ -500,8 +487,7 @@ class ShootingFinder:
         balanced = harmonic_balance.balance_first_harmonic(
             self.modes, laws, drive.acceleration, omega
         )
-        gauge = self.modes.output if self.modes.gauge is None else self.modes.gauge
-        heights = np.abs(balanced.modes @ gauge)
+        heights = np.abs(balanced.modes @ self.modes.measured)
 
         def find_point(place) -> CurvePoint:
             """Return the curve point at a circular frequency [rad/s], from the balance there."""
@@ -553,32 +539,22 @@ class ShootingFinder:
         ends = 2 * np.pi * np.array([drive.low, drive.high])
         bounds = (float(ends.min()), float(ends.max()))
         path = self._equations.follow(bounds, FREQUENCY_PATH, forward=drive.high > drive.low)
-        points = [self._make_curve_point(point) for point in path.points]
+        points = [self._describe_path_point(point) for point in path.points]
         folds = tuple(fold / (2 * np.pi) for fold in path.folds)
         return ResponseCurve(
             points, folds, tuple(note_end_of_curve(points, path.ended, drive.high))
         )
 
-    def _make_curve_point(self, point: PathPoint) -> CurvePoint:
+    def _describe_path_point(self, point: PathPoint) -> CurvePoint:
         """Return the CurvePoint of a point that the continuation has found."""
         signal = self.model.rig.drive.signal
         motion = point.motion
         regime = "stable" if motion.is_stable else "unstable"
         if not self.may_fold:
-            regime = self._name_regime(motion, is_stuck=False) + ", unstable" * (
-                not motion.is_stable
-            )
-        values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
-        values = {name: value for name, value in values.items() if np.isfinite(value)}
-        return CurvePoint(
-            drive=SineDrive(signal.acceleration, float(point.w[-1]), signal.moving),
-            values=values,
-            errors=estimate_point_errors(values, find_relative_error(motion)),
-            regime=regime,
-            multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
-            stable=motion.is_stable,
-            guess=point,
-        )
+            name = self._name_regime(motion, is_stuck=False)
+            regime = name if motion.is_stable else f"{name}, unstable"
+        drive = SineDrive(signal.acceleration, float(point.w[-1]), signal.moving)
+        return _make_curve_point(drive, motion, regime, point, is_stable=motion.is_stable)
 
     def _sweep_width(self) -> float:
         """Return the width of the swept frequency range [rad/s]."""
@@ -611,7 +587,7 @@ class ShootingFinder:
                 raise NotConverged(
                     "accuracy.method: no steady motion was found between two neighbouring points of the curve"
                 )
-            return self._make_curve_point(point)
+            return self._describe_path_point(point)
         omega = first.drive.omega + fraction * (second.drive.omega - first.drive.omega)
         sine = replace(first.drive, omega=omega)
         guess = first.guess if fraction < 0.5 else second.guess
@@ -631,6 +607,36 @@ def choose_start_frequencies(modes, drive) -> np.ndarray:
     frequencies = np.union1d(space(*ends, N_SWEEP_POINTS), natural)
     frequencies = frequencies[np.append(True, np.diff(frequencies) > 1e-9 * frequencies[1:])]
     return frequencies if drive.low < drive.high else frequencies[::-1]
+
+
+def _make_curve_point(
+    drive: SineDrive, motion: periodic.PeriodicMotion, regime: str, guess, *, is_stable: bool
+) -> CurvePoint:
+    """Return the point of a response curve with a periodic motion.
+
+    Parameters
+    ----------
+    drive : SineDrive
+    motion : PeriodicMotion
+    regime : str
+        Its name.
+    guess : PeriodicMotion or PathPoint
+        Guess for the motion at a neighbouring drive.
+    is_stable : bool
+        Whether the motion is stable or sticks.
+    """
+    values = {name: motion.run.values[name] for name in COLUMN_MEASURES.values()}
+    values = {name: value for name, value in values.items() if np.isfinite(value)}
+    sizes = np.abs(motion.multipliers)
+    return CurvePoint(
+        drive=drive,
+        values=values,
+        errors=estimate_point_errors(values, find_relative_error(motion)),
+        regime=regime,
+        multiplier=float(sizes.max()) if sizes.size else np.nan,
+        stable=is_stable,
+        guess=guess,
+    )
 
 
 def find_relative_error(motion: periodic.PeriodicMotion) -> float:
