@@ -25,8 +25,9 @@ from ...response.errors import (
     second_order_errors,
 )
 from ...response.measures import Values
+from ..bench.engine import Numerics
 from ..patch import faces
-from .engines import ENGINES, Numerics, divide_steps, enlarge_hybrid_steps, estimate_hybrid_errors
+from .engines import ENGINES, divide_steps, enlarge_hybrid_steps, estimate_hybrid_errors
 from .evaluation import Solution, first_interface_load
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.

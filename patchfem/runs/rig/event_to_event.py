@@ -33,7 +33,8 @@ from ...response.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
 from ..bench.masing import find_stretches
-from . import bands, engines
+from ..interfaces import bands
+from . import engines
 from .evaluation import (
     EngineRun,
     Fields,
@@ -132,7 +133,7 @@ class LumpedEvaluator(RunEvaluator):
     """Evaluator that computes runs of the engine `hybrid`, and measures from them."""
 
     def __init__(self, model, numerics, patch, joints: Joints):
-        super().__init__(model, numerics, patch, joints.contact, joints.stick_tolerance)
+        super().__init__(model, numerics, patch, joints, joints.stick_tolerance)
         self.joints = joints
         self.is_rigid = bool(joints.laws) and all(is_rigid(law.law) for law, _ in joints.laws)
         self.bands_slide_apart = model.rig.friction.bands_slide_apart and self.has_friction

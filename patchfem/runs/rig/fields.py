@@ -8,8 +8,7 @@ import numpy as np
 
 from ... import friction, slip
 from ...effects import law_has_trait, needs_bond_list
-from ..bench import averaged_law
-from ..bench import shear as bench_shear
+from ..interfaces import averaged_law, contact_points
 from ..patch import jenkins_elements
 from ..results.interfaces import Face
 from ..results.patch_rows import Arrays
@@ -62,7 +61,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         has_nodes = is_below or (has_shear and solution.contact.elements is None)
 
     if has_nodes or (has_shear and model.grooves is not None):
-        tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
+        tau, local = contact_points.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
         length = friction.record.make_law(f, patch.pressure.load).length
         elements = (solution.contact.reduction, length)

@@ -15,9 +15,9 @@ from ...response.loops import CycleLoop
 from ...response.measures import Values, bound_sampling_errors, compute_step_harmonic
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ...time_steps import time_march as engine
-from . import bands
-from .bond_lists import choose_bond_summation
-from .contact_points import make_contact
+from ..interfaces import bands
+from ..interfaces.bond_lists import choose_bond_summation
+from ..interfaces.contact_points import make_contact
 from .evaluation import (
     Fields,
     RunEvaluator,

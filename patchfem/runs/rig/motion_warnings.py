@@ -25,9 +25,9 @@ from ...response.outcome import (
 )
 from ...response.rows import AMPLITUDE
 from ..bench import bench
+from ..interfaces import joints
 from ..results.interfaces import Face, merge_sentences, warn_of_large_slide
 from ..results.notes import LAW_NOTES, LAW_WARNINGS
-from . import joints
 from .engines import ENGINES, find_obstacle_of_map
 
 # Number of cycles that are added to see whether the last loop of a bench is steady.
@@ -244,7 +244,8 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
         return
     slides = run.solution.window.slides.T
-    for joint, slide in zip(joints.list_joints(run.model, run.patch, run.numerics.meshed), slides):
+    listed = joints.list_joints(run.model, run.patch, run.numerics.meshed)
+    for joint, slide in zip(chain.from_iterable(one.split_by_bands() for one in listed), slides):
         _, yields = joint.list_elements()
         largest_yield = float(yields.max(initial=0.0))
         amplitude = float(np.ptp(slide)) / 2

@@ -30,19 +30,18 @@ from ...response.rows import set_final_floors
 from ...response.settling import find_slip_period
 from .. import refine
 from ..bench import bench
+from ..bench.engine import MIN_RELATIVE_STEP_ERROR, Numerics
+from ..interfaces import bond_lists
 from ..results.interfaces import check_pieces_overlap
 from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, Settings, Shortage
-from . import bond_lists, comparisons, decays, event_to_event, flutter, march, slides
+from . import comparisons, decays, event_to_event, flutter, march, slides
 from . import fields as interface_fields
 from .engines import (
     ENGINES,
     HYBRID,
     MARCH,
     MAX_MARCH_STEPS_PER_CYCLE,
-    MIN_RELATIVE_STEP_ERROR,
-    Numerics,
     choose_numerics,
-    make_bench_numerics,
 )
 from .evaluation import (
     Solution,
@@ -397,8 +396,8 @@ def estimate_slide_errors(model, patches, run: "bench.BenchRun", steps: int) -> 
     list of (str, dict)
         Source of the error, and errors by measure.
     """
-    solution = slides.make_slide_solution(run)
-    numerics = make_bench_numerics(model, steps, run.engine)
+    solution = slides.make_slide_solution(model, run)
+    numerics = replace(run.numerics, steps=steps)
     runs = comparisons.list_time_runs(numerics)
     runs += comparisons.list_space_runs(model, numerics, patches[0], len(patches) - 1, solution)
     return Runner(model, patches).estimate_errors(runs, solution)

@@ -1,15 +1,12 @@
 """Friction along the prescribed slide of a bench, as the Solution of a motion, and the fields of its interface."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...core import Outcome
-from ..bench import bench
-from ..bench.engine import nodal_element_limit
+from ..bench import bench, engine
+from ..bench.engine import Numerics
 from ..results.patch_rows import Arrays
 from ..results.result import Settings, SlipRule, make_interface_frames
-from .engines import Numerics
 from .evaluation import Solution
 
 
@@ -33,23 +30,12 @@ def solve_slide(
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
     """
-    if numerics.shear_modes is not None:
-        accuracy = model.accuracy.model_copy(update={"shear_modes": numerics.shear_modes})
-        model = replace(model, accuracy=accuracy)
-    run = bench.run_bench(
-        model,
-        patch,
-        numerics.steps,
-        n_frames,
-        choice=numerics.choice,
-        has_half_cells=numerics.has_half_cells,
-        say=say,
-        progress=progress,
+    return make_slide_solution(
+        model, bench.follow_slide(model, numerics, patch, n_frames, say, progress)
     )
-    return make_slide_solution(run)
 
 
-def make_slide_solution(run: bench.BenchRun) -> Solution:
+def make_slide_solution(model, run: bench.BenchRun) -> Solution:
     """Return the Solution of a run along a prescribed slide."""
     work = np.diff(run.ledger[0])
     book = {
@@ -67,8 +53,8 @@ def make_slide_solution(run: bench.BenchRun) -> Solution:
         book=book,
         seconds=run.seconds,
         contact=run.contact,
-        settings=Settings(run.engine.name),
-        bond_summation=run.engine.choice,
+        settings=Settings(engine.name_engine(model, run.numerics.choice)),
+        bond_summation=run.numerics.choice,
     )
 
 
@@ -86,11 +72,16 @@ def collect_slide_frames(model, patch, run: bench.BenchRun) -> Arrays:
     run : BenchRun
         Run along the slide, with its frames.
     """
+    # Parallel elements reach the limit of a node exactly, but the tractions of the cells of a face are interpolated.
+    is_exact = model.partial_slip and engine.uses_parallel_elements(model)
+    limit = None
+    if is_exact and model.patch.area is None:
+        limit = model.friction.static * patch.pressure.sigma_n
     return make_interface_frames(
         patch,
         run.time[run.frames],
         run.tau,
         run.local,
         run.slide[run.frames],
-        SlipRule(nodal_element_limit(model, patch), starts_at_rest=True),
+        SlipRule(limit, starts_at_rest=True),
     )

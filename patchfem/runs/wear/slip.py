@@ -15,10 +15,11 @@ from ...core import Measure, Outcome
 from ...response.outcome import judge_outcome
 from ...response.rows import AMPLITUDE
 from ..bench.slides import integrate_steps
+from ..interfaces import bands
 from ..results.interfaces import check_pieces_overlap
 from ..results.patch_rows import Values
 from ..results.result import UNBOUNDED_OUTCOMES
-from ..rig import bands, engines, fields, rig, slides
+from ..rig import engines, fields, rig, slides
 
 MIN_CYCLE_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
