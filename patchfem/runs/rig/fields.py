@@ -37,11 +37,11 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     """
     sigma = patch.pressure.sigma_n
     f = model.friction
-    window = solution.window
+    window = solution.run.window
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)
     # A motion without snapshots is that of a single point.
-    snapshots = solution.snapshots
+    snapshots = solution.run.snapshots
     n_samples = len(window.time)
     first = max(0, n_samples - 1 - n_samples // numerics.window)
     samples = np.linspace(first, n_samples - 1, N_INTERFACE_FRAMES).round().astype(int)
@@ -143,7 +143,7 @@ def _collect_varying_load_fields(patch, solution) -> Arrays:
     # The first frame is the pressed patch at rest; the others are snapshots of the motion.
     sets = solution.contact.sets
     weight = patch.pieces.interface.weight
-    snapshots = solution.snapshots
+    snapshots = solution.run.snapshots
     time = np.array([0.0, *(snapshot.time for snapshot in snapshots)])
     slide = np.array([0.0, *(snapshot.slide for snapshot in snapshots)])
     nodal = np.stack([patch.pressure.sigma_n * weight, *(snapshot.nodal for snapshot in snapshots)])
