@@ -8,10 +8,10 @@ the memory of the run (`list_memory_parts`), and refuses a run that needs more t
 import mmap
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from .. import friction, inputs, structure
 from ..core import Missing, add_interface_number
@@ -25,9 +25,6 @@ from .patch import plan as patch_plan
 from .results.patch_rows import Values
 from .rig import engines
 from .rig import plan as of_rig
-
-if TYPE_CHECKING:
-    from ..model.rig import BoltedJoint
 
 DIMENSIONLESS_GROUPS = {  # definition and SI unit of each group by its name
     "D": (
@@ -161,12 +158,15 @@ def _make_plan(model: Model) -> Plan:
     # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
     values: Values = {}
     if model.has_bolted_patch:
-        bolted = model.rig.structure.bolted
+        before = model.bolted
         model, patches, _ = joint.solve_without_joint(model)
         values = {name: measure.value for name, measure in patches[0].measures.items()}
     sentences = model.describe_removed_joint()
     if values:
-        model = _require_joint(model, bolted)
+        # A run has these modes of the structure alone, but subtracts the joint of its own meshes from the measured ones.
+        model = model.with_bolted(
+            model.bolted._replace(build_rig=before.build_rig, subtracted=before.subtracted)
+        )
     rig = model.rig
 
     # Links in series, groups and numbers of unknowns: of the structure, the patch, the interfaces and the law.
@@ -206,10 +206,9 @@ def _make_plan(model: Model) -> Plan:
             )
     if model.friction is not None and model.nominal_load > 0:
         chain |= _find_law_stiffnesses(model)
-    if model.spread is not None:
+    if model.spread_share is not None:
         # The pad carries this part of the force, and the bonds beyond its edges the rest.
-        share = friction.bonds.spread.carried_fraction(model.pad, model.spread)
-        groups["share_of_the_spread"] = share
+        groups["share_of_the_spread"] = model.spread_share
 
     # What the numbers say of the motion
     if rig is not None:
@@ -218,18 +217,6 @@ def _make_plan(model: Model) -> Plan:
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
     return Plan(model, engine, unknowns, samples, chain, groups, tuple(sentences))
-
-
-def _require_joint(model: Model, before: "BoltedJoint") -> Model:
-    """Return a model with the modes of the structure alone, of which a run subtracts the joint again.
-
-    The comparison run needs the solved patch, and each finer mesh has its own stiffness. `before` is the joint of the
-    model before its patch was solved.
-    """
-    bolted = model.rig.structure.bolted
-    bolted = bolted._replace(build_rig=before.build_rig, subtracted=before.subtracted)
-    rig = replace(model.rig, structure=replace(model.rig.structure, bolted=bolted))
-    return replace(model, rig=rig)
 
 
 def _find_law_stiffnesses(model: Model) -> "of_rig.Chain":
