@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...slip import first_loading, shear_modes
+from ...slip import shear_modes
 
 # Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
 # pressure.
@@ -78,13 +78,6 @@ def choose_modes(
         # its number of modes would have no bound.
         length = MIN_BOND_LENGTH_RATIO * float(limit @ (compliance @ limit) / limit.sum())
     bound = SHEAR_MODES_ERROR_RATIO * tolerance
-    if patch.model.area is not None:
-        if n_modes is not None:
-            modes = first_loading.find_cell_modes(compliance, limit, n_modes)
-        else:
-            modes = first_loading.find_sufficient_cell_modes(compliance, limit, length, bound)
-        shear_modes.require_stability(modes, softness.fall)
-        return modes
     if n_modes is not None:
         return shear_modes.shear_modes(compliance, limit, n_modes, softness.fall)
     return shear_modes.find_sufficient_modes(
