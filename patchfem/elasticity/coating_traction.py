@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.elements import ELEMENTS
+from ..mesh.elements import ELEMENTS, number_cells
 from ..mesh.grading import EQUAL_LENGTH_TOL
 from ..mesh.pieces import find_edges
 from .elasticity import compute_stiffness
@@ -89,12 +89,9 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
 def _compute_coating_forces(cells: Cells, nodes, u) -> np.ndarray:
     """Return the nodal forces (frames, N, 2) [N/m] by which coating cells at given nodes have displacements u [m]."""
     out = np.zeros(u.shape)
-    n_cells = 0
-    for kind, group in cells.groups.items():
-        is_coating = cells.is_coating[n_cells : n_cells + len(group)]
-        n_cells += len(group)
+    for kind, group, numbers in number_cells(cells.groups):
         # No other cell exerts a force of the coating on these nodes
-        group = group[is_coating & np.isin(group, nodes).any(axis=1)]
+        group = group[cells.is_coating[numbers] & np.isin(group, nodes).any(axis=1)]
         moduli = cells.layers.lame_constants(np.ones(len(group), bool))
         stiffness = compute_stiffness(cells.points, group, ELEMENTS[kind], *moduli)
         moved = u[:, group].reshape(*u.shape[:1], *stiffness.shape[:2], 1)
