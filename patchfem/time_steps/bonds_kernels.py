@@ -159,8 +159,8 @@ def release_bonds(numbers, trial, values, j):
     z *= cut
     s2 *= cut
 
-    # On the way back over the stretch, s2 + 2 z u + m u^2 >= 0 of a slide u would fail for fewer bonds m: a long slide under a
-    # jump of the load would create energy.
+    # On the way back over the stretch, s2 + 2 z u + m u^2 >= 0 of a slide u would fail for fewer bonds m: a long slide
+    # under a jump of the load would create energy.
     if slide * z < 0:
         back = min(abs(slide), s2 / abs(z))
         m = max(m, (2 * abs(z) - s2 / back) / back)
