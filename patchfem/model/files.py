@@ -9,25 +9,24 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from .. import inputs
 from ..effects import find_waveform
 from ..exceptions import PatchfemError
-from ..inputs import measured
 from ..mesh import files
 from ..scene.files import file_exists, list_named_files
 from ..scene.keys.tables import Tables
 from ..scene.rules.structure import MATRIX_KEYS
 from . import (
-    drive,
-    earlier_wear,
     face,
     gap,
     patch,
     peaks,
     pieces,
     profile,
+    rig,
     slide,
     structure_files,
-    structure_reduced,
+    wear,
 )
 
 
@@ -111,7 +110,7 @@ def _check_reduction(tables, folder: Path) -> list[Fault]:
     if not table or not all(file_exists(folder / file) for file in matrices):
         return []
     try:
-        structure_reduced.check_reduction(folder, table, is_base_driven=tables.drive.kind == "base")
+        structure_files.check_reduction(folder, table, is_base_driven=tables.drive.kind == "base")
     except PatchfemError as error:
         return [Fault(error.key, str(error))]
     return []
@@ -175,9 +174,9 @@ def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
     A signal is read only if its kind of drive is known: `is_valid`, or a kind in the `tables` of the scene.
     """
     if find_waveform(tables.drive).is_random:
-        drive.signals.read_spectrum(path)
+        inputs.signals.read_spectrum(path)
     elif is_valid or tables.drive.kind is not None:
-        drive.read_drive_file(path, tables.drive.kind)
+        rig.read_drive_file(path, tables.drive.kind)
 
 
 def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
@@ -220,8 +219,8 @@ def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple[str]:
     If the `tables` of this scene are valid (`is_valid`), the pieces must be those of the earlier run.
     """
     if is_valid:
-        return (earlier_wear.read_earlier_wear(path, tables).sentence,)
-    return (earlier_wear.read_end_state(path).sentence,)
+        return (wear.read_earlier_wear(path, tables).sentence,)
+    return (wear.read_end_state(path).sentence,)
 
 
 def _check_asperities(path: Path, tables, *, is_valid: bool) -> None:
@@ -248,10 +247,10 @@ FILE_CHECKS = {
     "structure.file": _check_structure,
     **{
         f"structure.reduced.{name}": _check_by_reading(
-            lambda path, name=name: structure_reduced.read_matrix(path, name)
+            lambda path, name=name: structure_files.read_matrix(path, name)
         )
         for name in MATRIX_KEYS
     },
-    "measured.file": _check_by_reading(measured.read_table),
+    "measured.file": _check_by_reading(inputs.measured.read_table),
     "wear.start": _check_wear_start,
 }

@@ -20,7 +20,7 @@ from ..scene.keys.tables import Accuracy, Friction
 from ..scene.overrides import replace_number
 from ..scene.rules.methods import MotionFeatures, find_motion_features
 from ..scene.scene import Scene
-from . import load, patch, rig, slide, structure, wear
+from . import patch, rig, slide, structure, wear
 from .law import build_interface_laws, find_pad_width, make_bond_parameters
 from .source import SceneWriter, Source, locate_errors
 
@@ -28,10 +28,9 @@ if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
     from ..friction.grooves import Grooves
     from .law import FrictionLimits
-    from .load import PointLoad
     from .patch import PatchModel
     from .rig import Rig
-    from .slide import SlidePath
+    from .slide import PointLoad, SlidePath
     from .wear import WearModel
 
 # Smallest default [m/s] of the rest speed of bonds in a rig, v_h of eq. 2.10
@@ -242,8 +241,8 @@ def _build(scene: Scene) -> Model:
         rig_model = _attach_bolted_model(scene, rig_model)
     point = grooves = None
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
-        point = load.build_point_load(scene, rig_model)
-        grooves = load.build_grooves(scene)
+        point = slide.build_point_load(scene, rig_model)
+        grooves = slide.build_grooves(scene)
 
     # The mesh of a patch is finer where contact edges move, or where partial slip must be resolved
     law = _build_law(scene, rig_model)
