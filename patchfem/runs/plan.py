@@ -21,6 +21,7 @@ from ..model.source import locate_errors
 from ..scene import refuse_attribute
 from . import joint, refine
 from .bench import engine as of_bench
+from .interfaces import bond_lists
 from .patch import plan as patch_plan
 from .results.patch_rows import Values
 from .rig import engines
@@ -261,7 +262,7 @@ def _interface_stiffnesses(model: Model) -> "of_rig.Chain":
     others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
     for number, interface in enumerate(others, 1):
         name = add_interface_number("bonds", number)
-        own_load = of_rig.find_interface_load(model, interface)
+        own_load = bond_lists.find_interface_load(model, interface)
         stiffnesses[name] = _law_stiffness(interface.numbers, own_load)
     return stiffnesses
 

@@ -152,15 +152,15 @@ def choose_slide_summation(model: Model, slide, *, is_smooth: bool = False):
     return choice
 
 
-def _find_load(model: Model, number: int) -> float:
-    """Return the normal load [N] of interface `number` of a rig."""
-    interfaces = model.rig.friction.interfaces
-    return model.nominal_load if len(interfaces) < 2 else interfaces[number].load
+def find_interface_load(model: Model, interface) -> float:
+    """Return the normal load [N] on an interface; that of the model for an interface without a load of its own."""
+    return model.nominal_load if interface.load is None else interface.load
 
 
 def _find_holding_ratio(model: Model, number: int) -> float:
     """Return the friction limit of interface `number` of a model over the force that holds it at rest."""
-    limit = model.rig.friction.interfaces[number].numbers.static * _find_load(model, number)
+    interface = model.rig.friction.interfaces[number]
+    limit = interface.numbers.static * find_interface_load(model, interface)
     holding_force = compute_holding_force(model.rig, number)
     return limit / holding_force if holding_force else inf
 
@@ -217,7 +217,7 @@ def refuse_unresolved_bond_vibration(model: Model, numerics) -> None:
         keys = interface.numbers
         if sums_over_lists(model, keys) and not interface.partial_slip:
             mobility = float((modes.interfaces[number] ** 2).sum()) / modes.mass
-            stiffness = keys.static * _find_load(model, number) / keys.bond_length
+            stiffness = keys.static * find_interface_load(model, interface) / keys.bond_length
             omega = max(omega, sqrt(stiffness * mobility))
 
     if omega * period / numerics.steps > MAX_BOND_VIBRATION_PHASE:
