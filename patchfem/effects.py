@@ -61,56 +61,32 @@ class Effect(NamedTuple):
 
 
 class Waveform(NamedTuple):
-    """Waveform of the drive.
+    """Waveform of the drive, whose traits are words of its row in effects.toml.
 
-    Other modules use the properties of a waveform and never compare its name.
+    Other modules use these traits and never compare the name.
 
     - name: value of `drive.waveform`; "" for a release, which has no waveform.
     - keys: required and optional keys of the table [drive], each separated by blanks.
-    - traits: words that set the properties below: "sine levels swept step random base-only endless".
+    - is_sine: whether the drive is a single sine of constant amplitude and frequency.
+    - has_levels: whether the drive is a sine whose amplitude takes the values of `drive.levels` in turn.
+    - is_swept: whether the drive is a sine whose frequency varies from `drive.from` to `drive.to`.
+    - is_step: whether the drive is a step at t = 0, after which the motion decays.
+    - is_random: whether the drive is a random signal with a given spectral density.
+    - is_for_base_only: whether the drive can only be a motion of the base, not a force.
     """
 
     name: str = ""
     keys: tuple[str, str] = ("", "")
-    traits: str = ""
+    is_sine: bool = False
+    has_levels: bool = False
+    is_swept: bool = False
+    is_step: bool = False
+    is_random: bool = False
+    is_for_base_only: bool = False
 
     def accepts_key(self, key: str) -> bool:
         """Return whether the waveform accepts a key of the table [drive]."""
         return key in re.findall(r"\w+", " ".join(self.keys))
-
-    def _has_trait(self, trait: str) -> bool:
-        """Return whether the waveform has a trait, one of the words of its row in WAVEFORMS."""
-        return trait in self.traits.split()
-
-    @property
-    def is_sine(self) -> bool:
-        """Whether the drive is a single sine of constant amplitude and frequency."""
-        return self._has_trait("sine")
-
-    @property
-    def has_levels(self) -> bool:
-        """Whether the drive is a sine whose amplitude takes the values of `drive.levels` in turn."""
-        return self._has_trait("levels")
-
-    @property
-    def is_swept(self) -> bool:
-        """Whether the drive is a sine whose frequency varies from `drive.from` to `drive.to`."""
-        return self._has_trait("swept")
-
-    @property
-    def is_step(self) -> bool:
-        """Whether the drive is a step at t = 0, after which the motion decays."""
-        return self._has_trait("step")
-
-    @property
-    def is_random(self) -> bool:
-        """Whether the drive is a random signal with a given spectral density."""
-        return self._has_trait("random")
-
-    @property
-    def is_for_base_only(self) -> bool:
-        """Whether the drive can only be a motion of the base, not a force."""
-        return self._has_trait("base-only")
 
     @property
     def has_steady_motion(self) -> bool:
@@ -177,13 +153,12 @@ GAP_SHAPES = {
     for name, effect in EFFECTS.items()
     if effect.module == "patchfem.contact.gaps"
 }
-WAVEFORMS = {
-    name.removeprefix("drive.waveform="): Waveform(
-        name.removeprefix("drive.waveform="), effect.keys, effect.traits
-    )
-    for name, effect in EFFECTS.items()
-    if name.startswith("drive.waveform=")
-}
+WAVEFORMS = {}
+for _effect_name, _effect in EFFECTS.items():
+    if _effect_name.startswith("drive.waveform="):
+        _name = _effect_name.removeprefix("drive.waveform=")
+        _traits = dict.fromkeys(_effect.traits.split(), True)
+        WAVEFORMS[_name] = Waveform(_name, _effect.keys, **_traits)
 NO_WAVEFORM = Waveform()  # waveform of a release and of an unknown name
 
 

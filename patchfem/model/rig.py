@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -41,9 +41,8 @@ from .structure import (
 )
 
 if TYPE_CHECKING:
-    from ..scene.keys.tables import Friction
     from ..structure.drives import DriveSignal
-    from .patch import PatchModel
+    from .model import Model
 
 # Largest displacement [m] up to which a motion that grows without bound is computed.
 MAX_COMPUTED_DISPLACEMENT = 1e3
@@ -184,14 +183,6 @@ class FirstMode:
         return float(np.ptp(slides[:, 1:], axis=0).max(initial=0.0)) / whole_range
 
 
-class JointModel(Protocol):
-    """Model of another scene (`model.Model`), of which the solution of its joint needs the patch and the law."""
-
-    patch: "PatchModel"
-    friction: "Friction"
-    rig: "Rig"
-
-
 class BoltedJoint(NamedTuple):
     """Joint that was bolted when the modes of a rig were measured.
 
@@ -211,7 +202,7 @@ class BoltedJoint(NamedTuple):
     subtracted: SubtractedJoint | None = None
     build_rig: "Callable[[SubtractedJoint], Rig] | None" = None
     build_stiffer_rig: "Callable[[SubtractedJoint], Rig] | None" = None
-    model: JointModel | None = None
+    model: "Model | None" = None
     stuck_stiffness: float | None = None
 
 

@@ -15,7 +15,7 @@ from ...contact import contact_sets
 from ...core import MIN_LOAD
 from ...effects import law_has_trait, law_takes_stiffness_or_length
 from ...model.model import Model
-from ...slip import first_loading, shear_modes
+from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega
 from ...time_steps import contacts, laws, systems
 from ...time_steps.contacts import PointSet
@@ -290,13 +290,6 @@ def _choose_modes(joint: Joint, law, numerics, *, moves: bool) -> shear_modes.Sh
             # Rigid friction is replaced by a length far below the mean displacement under the friction limits of all
             # nodes, as its number of modes would have no bound.
             length = MIN_BOND_LENGTH_RATIO * float(limit @ (compliance @ limit) / limit.sum())
-        if patch.model.area is not None:
-            if count is not None:
-                modes = first_loading.find_cell_modes(compliance, limit, count)
-            else:
-                modes = first_loading.find_sufficient_cell_modes(compliance, limit, length, bound)
-            shear_modes.require_stability(modes, fall)
-            return modes
         if count is not None:
             return shear_modes.shear_modes(compliance, limit, count, fall)
         first = shear_modes.N_SHEAR_MODES
