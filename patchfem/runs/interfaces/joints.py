@@ -120,6 +120,12 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     return joints
 
 
+def list_parts(model: Model, patch, meshed=()) -> list[Joint]:
+    """Return the interfaces of a model as `list_joints` does, but the bands of a face that slide apart in place of it."""
+    joints = list_joints(model, patch, meshed)
+    return [part for joint in joints for part in joint.split_by_bands()]
+
+
 def has_elements(law) -> bool:
     """Return whether a patch with a law that slips part by part is a set of parallel elements, under a constant load."""
     return law_supports(law, "pieces") and law_supports(law, "shear")

@@ -216,8 +216,8 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
         return
     slides = run.solution.run.window.slides.T
-    listed = joints.list_joints(run.model, run.patch, run.numerics.meshed)
-    for joint, slide in zip(chain.from_iterable(one.split_by_bands() for one in listed), slides):
+    parts = joints.list_parts(run.model, run.patch, run.numerics.meshed)
+    for joint, slide in zip(parts, slides):
         _, yields = joint.list_elements()
         largest_yield = float(yields.max(initial=0.0))
         amplitude = float(np.ptp(slide)) / 2

@@ -299,8 +299,18 @@ def run_motion(inputs: RunInputs) -> Result:
         onset = levels.measure_onset_level(rig, found, run.coarser, model.accuracy.tolerance)
         run = replace(run, measures=run.measures | {"onset_level": onset})
     run = complete_measures(run)
+    decay = None
     if is_free and run.has_errors:
-        run = _add_decay_curve(run)
+        decay = decays.compute_decay_curve(run.solution, run.coarser)
+    if decay is not None:
+        space_runs = comparisons.list_space_runs(
+            model, run.numerics, run.patch, inputs.n_coarse, run.solution
+        )
+        has_mesh_run = any(one.source == "mesh" for one in space_runs)
+        decay, notes = decays.add_mesh_errors(
+            decay, model, inputs.patches, inputs.stiffer, has_mesh_run=has_mesh_run
+        )
+        run = replace(run, decay=decay, notes=notes)
     if run.has_friction and structure.drive_sizes.find_decay_rate(rig.modes) < 0:
         measures, notes = flutter.compute_flutter_amplitude(run)
         run = replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
@@ -613,35 +623,3 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
     other_modes = rig.first_mode.fraction_of_other_modes(window.modal)
     measures |= reasons.find_missing(measures, window, run.drive, run.has_friction, other_modes)
     return replace(run, outcome=outcome, measures=measures)
-
-
-def _add_decay_curve(run: CoupledRun) -> CoupledRun:
-    """Return a released run with its decay curve, including mesh errors.
-
-    A note says where the mesh error is unknown.
-    """
-    model = run.model
-    solution = run.solution
-    run = replace(run, decay=decays.compute_decay_curve(solution, run.coarser))
-    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
-    if run.decay is None or not has_partial_slip:
-        return run
-
-    # Below the slip of the first node, two meshes have the same decay, so that static loops give the mesh error.
-    decay = run.decay
-    coarse = run.inputs.coarse[0]
-    mesh_errors = decays.estimate_stuck_mode_mesh_errors(
-        decay.amplitude, decay.frequency[-1], model, run.patch, coarse, run.inputs.stiffer
-    )
-    frequency_error, damping_error = mesh_errors.errors
-    decay = decay._replace(
-        frequency_error=np.fmax(decay.frequency_error, frequency_error),
-        damping_error=np.fmax(decay.damping_error, damping_error),
-    )
-    if not mesh_errors.reason:
-        return replace(run, decay=decay)
-    coarser = comparisons.list_space_runs(
-        model, run.numerics, run.patch, run.inputs.n_coarse, solution
-    )
-    note = decays.describe_unknown_mesh_error(mesh_errors.reason, coarser)
-    return replace(run, decay=decay, notes=(note,))
