@@ -10,7 +10,7 @@ from math import ceil, floor, log, log2
 
 import numpy as np
 
-from ... import structure
+from ... import compiled, structure
 from ...convergence import convergence_error
 from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...model import rig as model_rig
@@ -74,14 +74,17 @@ def solve_rig(model, numerics, patch, n_frames: int = 0, say=None, progress=None
     """
     # Only the module of this engine is loaded.
     if numerics.engine == "bench":
-        return slides.solve_slide(model, numerics, patch, n_frames, say, progress)
+        run = bench.follow_slide(model, numerics, patch, n_frames, say=say, progress=progress)
+        return slides.make_slide_solution(run)
+    if numerics.engine == "harmonic":
+        solution = shooting.solve_steady_motion(model, numerics, patch, n_frames, say)
+        return replace_output_by_gauge(model, solution)
     if numerics.engine == "hybrid":
-        run = event_to_event.run_from_event_to_event
-    elif numerics.engine == "march":
-        run = march.march_in_time
+        compiled.report_compilation_to(say)
+        evaluator = event_to_event.LumpedEvaluator(model, numerics, patch)
     else:
-        run = shooting.solve_steady_motion
-    return replace_output_by_gauge(model, run(model, numerics, patch, n_frames, say, progress))
+        evaluator = march.MarchEvaluator(model, numerics, patch, say)
+    return replace_output_by_gauge(model, evaluator.solve(n_frames, progress))
 
 
 class Runner:
