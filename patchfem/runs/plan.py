@@ -21,6 +21,7 @@ from ..model.source import locate_errors, name_key
 from ..scene import refuse_attribute
 from . import joint, refine
 from .bench import engine as of_bench
+from .interfaces import bond_lists
 from .patch import plan as patch_plan
 from .results.patch_rows import Values
 from .rig import engines
@@ -228,7 +229,7 @@ def _find_law_stiffnesses(model: Model) -> "of_rig.Chain":
     loads = [(model.friction, model.nominal_load)]
     if model.rig is not None:
         for interface in model.rig.friction.interfaces[1:]:
-            loads.append((interface.numbers, of_rig.find_interface_load(model, interface)))
+            loads.append((interface.numbers, bond_lists.find_interface_load(model, interface)))
     stiffnesses = {}
     if model.grooves is not None:
         stiffnesses["grooves"] = model.grooves.stiffness(model.nominal_load)

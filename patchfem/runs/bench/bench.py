@@ -78,9 +78,7 @@ class BenchRun(SlideHistories):
         )
 
 
-def run_bench(
-    model, patch, steps: int, n_frames: int = 0, path=None, choice=None, say=None
-) -> BenchRun:
+def run_bench(model, patch, steps: int, n_frames: int = 0, choice=None, **options) -> BenchRun:
     """Compute the friction response of a model to its prescribed displacement with a number of steps.
 
     Parameters
@@ -93,20 +91,18 @@ def run_bench(
         Steps per cycle.
     n_frames : int
         Number of output frames of the fields.
-    path : SlideSamples, optional
-        Displacement path; default: the path of the model.
     choice : EngineChoice, optional
         Method of a sum over lists of bonds; default: by the tolerance.
-    say : callable, optional
-        Callback for messages about compilation.
+    **options
+        Path and callbacks of `follow_slide`.
     """
-    numerics = make_bench_numerics(model, steps, path)
+    numerics = make_bench_numerics(model, steps, options.get("path"))
     numerics = replace(numerics, choice=numerics.choice and (choice or numerics.choice))
-    return follow_slide(model, numerics, patch, n_frames, say, path=path)
+    return follow_slide(model, numerics, patch, n_frames, **options)
 
 
 def follow_slide(
-    model, numerics: Numerics, patch, n_frames: int = 0, say=None, progress=None, path=None
+    model, numerics: Numerics, patch, n_frames: int = 0, path=None, **callbacks
 ) -> BenchRun:
     """Compute the friction response of a model to a prescribed displacement.
 
@@ -120,10 +116,10 @@ def follow_slide(
         None for a single point.
     n_frames : int
         Number of output frames of the fields; the initial state is not one of them.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction.
     path : SlideSamples, optional
         Displacement path; default: the path of the model.
+    **callbacks
+        Fields `say` and `progress` of SlideTask.
 
     Raises
     ------
@@ -134,7 +130,7 @@ def follow_slide(
     time, slide, first, omega = sample_path(model, numerics.steps, path)
     frames = np.linspace(0, slide.size - 1, n_frames + 1).round().astype(int)[1:]
     frames = np.unique(frames[frames > 0])
-    histories = follow_path(SlideTask(model, patch, numerics, time, slide, frames, say, progress))
+    histories = follow_path(SlideTask(model, patch, numerics, time, slide, frames, **callbacks))
 
     # The measures of a loop exist only for a cyclic motion.
     values = _compute_measures(model, histories, first)
