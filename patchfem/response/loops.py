@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import max_abs
 from ..effects import law_has_trait
 from ..motion_measures import find_reversal_steps, measure_loop
 from .measures import MODAL_COORDINATE_ROUND_OFF, Values, compute_harmonic
@@ -138,7 +139,7 @@ def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, flo
     Returns the index of the preceding sample and the position as a fraction of the step, or (None, 0) without a zero.
     """
     k = sample - 1 if first else sample
-    if abs(v[sample]) <= REST_SLIDE_RATE_TOL * np.abs(v).max(initial=0.0):
+    if abs(v[sample]) <= REST_SLIDE_RATE_TOL * max_abs(v):
         return sample, 0.0
     if 0 <= k < v.size - 1 and v[k] > 0 >= v[k + 1]:
         return k, float(v[k] / (v[k] - v[k + 1]))
@@ -187,7 +188,7 @@ def _find_force_around_rest(slide, force, sample: int, value: float) -> float | 
     is_moving = step > MIN_MOVING_STEP_RATIO * step.max(initial=0.0)
     is_moving &= np.maximum(
         np.abs(slide[1:] - value), np.abs(slide[:-1] - value)
-    ) > MODAL_COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
+    ) > MODAL_COORDINATE_ROUND_OFF * max_abs(slide)
     before = np.flatnonzero(is_moving[:sample])
     after = np.flatnonzero(is_moving[sample:])
     if not before.size or not after.size:

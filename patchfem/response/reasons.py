@@ -151,7 +151,7 @@ def _list_open_loops(measures: Measures, window, drive) -> list[str]:
     _, stored, dissipated, created = np.abs(ledger[:, -1] - ledger[:, 0])
     areas = {name: one for name, one in measures.items() if name.startswith("loop_area")}
     if len(areas) == 1:
-        cycles = (window.time[-1] - window.time[0]) / drive.period
+        cycles = window.span / drive.period
         return list(areas) if stored > max(dissipated, loop.floor * cycles) else []
     if created > 1e-9 * (stored + dissipated):
         return []
@@ -206,7 +206,7 @@ def _explain_missing_cycle_value(
     """
     if not structure.drive_sizes.is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
-    if not structure.drive_sizes.has_full_cycle(window.time[-1] - window.time[0], drive):
+    if not structure.drive_sizes.has_full_cycle(window.span, drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATION_MEASURES and ACCELERATION_MEASURES[0] in values:
         return OUTPUT_AT_REST_REASON

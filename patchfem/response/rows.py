@@ -81,7 +81,7 @@ class LastCycles:
     @cached_property
     def span(self) -> float:
         """Duration of the window [s]."""
-        return self.window.time[-1] - self.window.time[0]
+        return self.window.span
 
     @cached_property
     def slip_measures(self) -> Values:
