@@ -16,7 +16,7 @@ from ..core import PatchfemError
 from ..disk.atomic_write import write_atomically
 from .checks import CELL_TAGS, EDGE_TAGS, PairMesh, TaggedCells, TaggedMesh, build_pair
 from .decks import read_deck
-from .elements import ELEMENTS
+from .elements import ELEMENTS, number_cells
 from .pieces import find_edges
 
 # Largest size of a mesh file [bytes]; meshes of two plane pieces are smaller
@@ -88,11 +88,8 @@ def join_meshes(lower_piece, upper_piece) -> tuple[np.ndarray, dict[str, TaggedC
     n_points = 0
     for side, sign, body in (("lower", -1.0, lower_piece), ("upper", 1.0, upper_piece)):
         # Cells of a kind, with the numbers of their nodes among those of both pieces
-        n_cells = 0
-        for kind, nodes in body.blocks.items():
-            is_coating = body.is_coating[n_cells : n_cells + len(nodes)]
-            n_cells += len(nodes)
-            names = np.where(is_coating, f"{side}_coating", f"{side}_substrate")
+        for kind, nodes, numbers in number_cells(body.blocks):
+            names = np.where(body.is_coating[numbers], f"{side}_coating", f"{side}_substrate")
             cells.setdefault(kind, []).append((nodes + n_points, names))
 
         # Lines along the tagged edges of the border; those of second order have the node in their middle as well
