@@ -206,7 +206,7 @@ def _explain_missing_cycle_value(
     """
     if not structure.drive_sizes.is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
-    if not structure.drive_sizes.has_full_cycle(window.span, drive):
+    if not structure.drive_sizes.has_full_cycle(window.time[-1] - window.time[0], drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATION_MEASURES and ACCELERATION_MEASURES[0] in values:
         return OUTPUT_AT_REST_REASON
