@@ -22,7 +22,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..core import DriveSegment, ModalBasis, array_dataclass
+from ..core import DriveSegment, ModalBasis, array_dataclass, max_abs
 from .drive_sizes import DriveKeys, count_cycles_per_level
 
 
@@ -240,7 +240,7 @@ class RecordedDrive:
     @property
     def max_acceleration(self) -> float:
         """Largest acceleration [m s-2]."""
-        return float(np.abs(self.value).max())
+        return max_abs(self.value)
 
     @property
     def duration(self) -> float:
