@@ -501,6 +501,13 @@ MOTION_MEASURE_ROWS = (
         "is largest; a resonance unless it is an end of that range",
     ),
     MeasureDefinition(
+        "peak_width",
+        "Hz",
+        0.0,
+        "width of the highest peak of a drawn response curve between the frequencies at which the amplitude is the peak "
+        "divided by the square root of 2",
+    ),
+    MeasureDefinition(
         "friction_ratio_end",
         "1",
         1e-9,

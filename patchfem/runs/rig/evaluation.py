@@ -212,9 +212,10 @@ def compute_sampled_loop(window, drive, work: float, force=None) -> CycleLoop | 
 
 
 def compute_peak_frequency(solution: Solution, coarser=()) -> Measures:
-    """Return a dict with the frequency [Hz] of the peak of a response curve and its error.
+    """Return a dict with the frequency [Hz] and the half-power width [Hz] of the peak of a response curve.
 
-    The measure has no value if the amplitude is 0. The dict is empty without a curve.
+    The measures have no value if the amplitude is 0. The dict is empty without a curve, and has no width if only the peak
+    of the curve was computed.
 
     Parameters
     ----------
@@ -226,7 +227,7 @@ def compute_peak_frequency(solution: Solution, coarser=()) -> Measures:
     Returns
     -------
     dict
-        `peak_frequency`, or {}.
+        `peak_frequency` and `peak_width`, or {}.
     """
     if np.isnan(solution.peak_error):
         return {}
@@ -236,7 +237,9 @@ def compute_peak_frequency(solution: Solution, coarser=()) -> Measures:
     peaks = [run.drive.omega / (2 * np.pi) for run in coarser if run.drive is not None]
     shift = float(np.abs(np.array(peaks) - peak_frequency).max(initial=0.0))
     error = solution.peak_error + convergence_error(shift)
-    return {"peak_frequency": Measure(peak_frequency, "Hz", error, 0.0)}
+    peak = {"peak_frequency": Measure(peak_frequency, "Hz", error, 0.0)}
+    width = solution.periodic and solution.periodic.width
+    return peak if width is None else peak | {"peak_width": width}
 
 
 # Relative error of the measures of an event-driven run, which has round-off only.

@@ -548,7 +548,7 @@ class ShootingFinder:
         bounds = (float(ends.min()), float(ends.max()))
         path = self._equations.follow(bounds, FREQUENCY_PATH, forward=drive.high > drive.low)
         points = [self._describe_path_point(point) for point in path.points]
-        folds = tuple(fold / (2 * np.pi) for fold in path.folds)
+        folds = np.array([path.folds, path.fold_errors]) / (2 * np.pi)
         return ResponseCurve(
             points, folds, tuple(note_end_of_curve(points, path.ended, drive.high))
         )
