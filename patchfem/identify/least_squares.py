@@ -16,8 +16,9 @@ from .intervals import FitIntervals, IntervalKind, compute_intervals
 
 # A descent has reached the best minimum if the ratio of its residual to the smallest one is at most this value.
 SAME_MINIMUM_RATIO = 1.01
-# Number of trial points per parameter for the choice of the starting points.
+# Number of trial points for the choice of the starting points: per parameter, and per start of an expensive residual
 N_TRIALS_PER_VALUE = 8
+N_TRIALS_PER_START = 3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -175,17 +176,16 @@ class Problem:
         return replace(fit, intervals=intervals, counts=self.model.counts)
 
     def _choose_starts(self, max_points: int) -> list[np.ndarray]:
-        """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points.
-
-        If evaluations are expensive, no more points are tried than needed.
-        """
+        """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points."""
         space = self.model.space
         n = space.low.size
         given = [] if self.start is None else [space.to_unit_cube(self.start)]
         points = [point for point in given if np.isfinite(self._try_point(point))]
         trials = []
         if max_points > len(points):
-            count = max_points if self.model.is_expensive else N_TRIALS_PER_VALUE * n
+            count = N_TRIALS_PER_VALUE * n
+            if self.model.is_expensive:
+                count = N_TRIALS_PER_START * max_points
             trials = make_space_filling_points(count, n)
             costs = np.array([self._try_point(point) for point in trials])
             order = np.argsort(costs, kind="stable")
