@@ -26,10 +26,10 @@ MAX_UNREFINED_RESIDUAL = 1e-8
 MAX_REFINEMENT_CHANGE = 1e-2
 
 
-class CellBlock(NamedTuple):
-    """Cells of one element.
+class StiffCells(NamedTuple):
+    """Cells of one piece; those with fewer nodes than others have the node n, which does not exist, and zeros for it.
 
-    - nodes (t, k): node numbers.
+    - nodes (t, k): node numbers from 0 to n - 1, or n.
     - matrices (t, 2 k, 2 k): stiffnesses per unit width [N/m per m].
     """
 
@@ -58,7 +58,7 @@ class Front(NamedTuple):
 class Fronts:
     """Factors of the stiffness of a piece with n nodes, of which m lie on the interface.
 
-    - ``blocks``: cells, in which fixed displacements are decoupled
+    - ``cells``: cells, in which fixed displacements are decoupled
     - ``fronts``: fronts in the order of elimination; empty if only the compliance is wanted
     - ``interface``: (m,) nodes
     - ``compliance``: (2 m, 2 m) displacements of the interface per unit force on it [m2/N], node by node along x and
@@ -67,7 +67,7 @@ class Fronts:
     - ``smallest_pivot``: smallest pivot relative to the diagonal entry of its front
     """
 
-    blocks: list[CellBlock]
+    cells: StiffCells
     fronts: list[Front]
     interface: np.ndarray
     compliance: np.ndarray
@@ -93,11 +93,13 @@ class Fronts:
 
     def compute_forces(self, u) -> np.ndarray:
         """Return the nodal forces (n, 2, r) [N/m] that cause displacements of the same shape [m]."""
-        out = np.zeros_like(u)
-        for nodes, matrices in self.blocks:
-            local = u[nodes].reshape(len(nodes), -1, u.shape[-1])
-            np.add.at(out, nodes, (matrices @ local).reshape(*nodes.shape, 2, -1))
-        return out
+        nodes, matrices = self.cells
+        out = np.zeros((len(u) + 1, *u.shape[1:]))
+        out[:-1] = u
+        local = out[nodes].reshape(*matrices.shape[:2], -1)
+        out[:] = 0.0
+        np.add.at(out, nodes, (matrices @ local).reshape(*nodes.shape, 2, -1))
+        return out[:-1]
 
     def estimate_round_off(self) -> float:
         """Estimate the relative round-off error of the compliance from one step of iterative refinement.
@@ -191,14 +193,14 @@ def _bisect_cells(positions) -> tuple[list[_Part], list[np.ndarray]]:
 
 
 def condense_to_interface(
-    blocks: list[CellBlock], positions, interface, is_fixed, *, keep_fronts: bool = True
+    cells: StiffCells, positions, interface, is_fixed, *, keep_fronts: bool = True
 ) -> Fronts:
     """Condense a mesh to its interface.
 
     Parameters
     ----------
-    blocks : list of CellBlock
-        Stiffnesses of the t cells, by element, in which the fixed displacements are then decoupled.
+    cells : StiffCells
+        Stiffnesses of the t cells, in which the fixed displacements are then decoupled.
     positions : (t, 2) ndarray
         Positions of the cells, by which they are divided.
     interface : (m,) ndarray of int
@@ -218,12 +220,19 @@ def condense_to_interface(
         If the stiffness is not positive definite.
     """
     # A node is eliminated in the smallest part that contains all of its cells
-    for block in blocks:
-        _decouple_fixed(block, is_fixed)
+    n_nodes = len(is_fixed)
+    _decouple_fixed(cells, np.append(is_fixed, [[False, False]], axis=0))
     parts, leaves = _bisect_cells(positions)
-    first, last = _find_leaves_of_nodes(blocks, leaves, len(is_fixed))
-    last[interface] = len(leaves)  # these nodes belong to no part
-    position = np.empty(len(is_fixed) + 1, np.int64)
+
+    # First and last leaf that contains a cell of each node; the nodes of the interface belong to no part
+    first = np.full(n_nodes + 1, len(leaves))
+    last = np.full(n_nodes + 1, -1)
+    for number, members in enumerate(leaves):
+        nodes = cells.nodes[members]
+        first[nodes] = np.minimum(first[nodes], number)
+        last[nodes] = number
+    last[interface] = len(leaves)
+    position = np.empty(n_nodes + 1, np.int64)
 
     # Halves stand before their part, so their stiffnesses are ready when the part is reached
     stiffnesses = {}
@@ -233,14 +242,16 @@ def condense_to_interface(
         for number, part in enumerate(parts):
             if part.halves:
                 terms = [stiffnesses.pop(half) for half in part.halves]
+                nodes = _merge_nodes([term.nodes for term in terms])
             else:
-                terms = _select_cells(blocks, leaves[part.first_leaf])
-            nodes = _merge_nodes([term.nodes for term in terms])
+                terms = StiffCells(*(values[leaves[part.first_leaf]] for values in cells))
+                nodes = _merge_nodes([terms.nodes])
+                nodes = nodes[nodes < n_nodes]
             is_own = (first[nodes] >= part.first_leaf) & (last[nodes] < part.end_leaf)
             own = nodes[is_own]
             boundary = nodes[~is_own]
             # A last node that does not exist stands for those that a term does not contain
-            order = np.concatenate((own, boundary, [len(is_fixed)]))
+            order = np.concatenate((own, boundary, [n_nodes]))
             add_terms = _add_stiffnesses if part.halves else _assemble_cells
             matrix = add_terms(terms, order, position)
             front, stiffnesses[number] = _eliminate(own, boundary, matrix)
@@ -255,51 +266,20 @@ def condense_to_interface(
         factor, pivot = _factorise(schur.take(unknowns, 0).take(unknowns, 1))
         compliance = cho_inverse(factor)
     smallest_pivot = min(pivot, *smallest_pivots)
-    return Fronts(blocks, fronts, interface, compliance, len(is_fixed), smallest_pivot)
+    return Fronts(cells, fronts, interface, compliance, n_nodes, smallest_pivot)
 
 
-def _decouple_fixed(block: CellBlock, is_fixed) -> None:
-    """Decouple the fixed displacements in the stiffness of each cell of a block, with 1 on the diagonal.
+def _decouple_fixed(cells: StiffCells, is_fixed) -> None:
+    """Decouple the fixed displacements in the stiffness of each cell, with 1 on the diagonal.
 
-    `is_fixed` (N, 2) tells which displacements are 0. Their rows and columns become 0.
+    `is_fixed` (n + 1, 2) tells which displacements are 0. Their rows and columns become 0.
     """
-    is_fixed = is_fixed[block.nodes].reshape(len(block.nodes), -1)
-    cells = np.flatnonzero(is_fixed.any(axis=1))
-    is_free = ~is_fixed[cells]
-    block.matrices[cells] *= is_free[:, :, None] & is_free[:, None]
+    is_fixed = is_fixed[cells.nodes].reshape(len(cells.nodes), -1)
+    held = np.flatnonzero(is_fixed.any(axis=1))
+    is_free = ~is_fixed[held]
+    cells.matrices[held] *= is_free[:, :, None] & is_free[:, None]
     cell, unknown = np.nonzero(is_fixed)
-    block.matrices[cell, unknown, unknown] = 1.0
-
-
-def _find_leaves_of_nodes(blocks, leaves, n_nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers (n_nodes,) of the first and the last leaf that contains a cell of each node.
-
-    A leaf is a smallest part of the mesh. `leaves` lists the cells of each leaf, numbered through all `blocks`
-    (CellBlock).
-    """
-    leaf = np.empty(sum(len(block.nodes) for block in blocks), np.int64)
-    for number, cells in enumerate(leaves):
-        leaf[cells] = number
-    first = np.full(n_nodes, len(leaves))
-    last = np.full(n_nodes, -1)
-    n_cells = 0
-    for nodes, _ in blocks:
-        of_cell = leaf[n_cells : n_cells + len(nodes), None]
-        n_cells += len(nodes)
-        np.minimum.at(first, nodes, of_cell)
-        np.maximum.at(last, nodes, of_cell)
-    return first, last
-
-
-def _select_cells(blocks, cells) -> list[CellBlock]:
-    """Return the given `cells`, which are numbered through all `blocks` (CellBlock), by element."""
-    selected = []
-    n_cells = 0
-    for nodes, matrices in blocks:
-        block_cells = cells[(cells >= n_cells) & (cells < n_cells + len(nodes))] - n_cells
-        n_cells += len(nodes)
-        selected.append(CellBlock(nodes[block_cells], matrices[block_cells]))
-    return selected
+    cells.matrices[cell, unknown, unknown] = 1.0
 
 
 def _merge_nodes(node_arrays) -> np.ndarray:
@@ -311,20 +291,13 @@ def _merge_nodes(node_arrays) -> np.ndarray:
     return np.concatenate((nodes[:-1][nodes[1:] > nodes[:-1]], nodes[-1:]))
 
 
-def _assemble_cells(blocks, nodes_in_order, position) -> np.ndarray:
-    """Return the stiffness (2 k, 2 k) [N/m per m] of cells for k nodes.
-
-    `blocks` are the cells by element, `nodes_in_order` (k,) are the nodes, and `position` (N + 1,) is a workspace for
-    the places of all N nodes in `nodes_in_order`.
-    """
-    position[nodes_in_order] = np.arange(nodes_in_order.size)
-    size = 2 * nodes_in_order.size
-    total = 0.0
-    for nodes, matrices in blocks:
-        unknowns = _number_unknowns(position[nodes])
-        entries = unknowns[:, :, None] * size + unknowns[:, None]
-        total = total + np.bincount(entries.ravel(), matrices.ravel(), size**2)
-    return total.reshape(size, size)
+def _assemble_cells(cells: StiffCells, order, position) -> np.ndarray:
+    """Return the stiffness (2 k, 2 k) [N/m per m] of cells for the nodes `order` (k,); see `_add_stiffnesses`."""
+    position[order] = np.arange(order.size)
+    unknowns = _number_unknowns(position[cells.nodes])
+    size = 2 * order.size
+    entries = unknowns[:, :, None] * size + unknowns[:, None]
+    return np.bincount(entries.ravel(), cells.matrices.ravel(), size**2).reshape(size, size)
 
 
 def _add_stiffnesses(terms, order, position) -> np.ndarray:

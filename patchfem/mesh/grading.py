@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -143,15 +144,35 @@ def divide_into_columns(layout: Layout, required_positions=()) -> np.ndarray:
     return frozen_array(np.concatenate(parts))
 
 
-def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarray, int]:
+class RowHeights(NamedTuple):
+    """Heights [m] of the rows of cells of a piece at some depths, between which they grow.
+
+    - first, last: At the interface and at the far face.
+    - coating: At the inner face of the coating.
+    - largest: Largest height.
+    - growth: Growth of the height with the distance from these places [1].
+    """
+
+    first: float
+    last: float
+    coating: float
+    largest: float
+    growth: float
+
+
+def divide_into_rows(
+    height: float, coating_thickness: float, rows: RowHeights
+) -> tuple[np.ndarray, int]:
     """Return the depths that bound the rows of cells, at least two in the coating and three below it.
 
     Parameters
     ----------
-    layout : Layout
-        Interval from the interface to the far face, and target heights.
+    height : float
+        Depth of the far face [m].
     coating_thickness : float
-        Thickness of the coating [m], at whose depth a row ends.
+        Thickness of the coating [m], at whose depth a row ends; 0 without a coating.
+    rows : RowHeights
+        Target heights.
 
     Returns
     -------
@@ -160,12 +181,12 @@ def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarr
     coating_rows : int
         Number of rows in the coating.
     """
-    substrate_lines = divide_interval(
-        replace(layout, start=layout.start + coating_thickness), min_cells=3
-    )
-    if coating_thickness <= 0:
-        return frozen_array(substrate_lines), 0
-    coating_lines = divide_interval(
-        replace(layout, stop=layout.start + coating_thickness), min_cells=2
-    )[:-1]
-    return frozen_array(np.concatenate([coating_lines, substrate_lines])), coating_lines.size
+    bands = ((0.0, 0.0, rows.first), (height, height, rows.last))
+    if coating_thickness:
+        bands += ((coating_thickness, coating_thickness, rows.coating),)
+    layout = Layout(0.0, height, bands, (0.0, height), rows.largest, rows.largest, rows.growth)
+    depths = divide_interval(replace(layout, start=coating_thickness), min_cells=3)
+    if not coating_thickness:
+        return frozen_array(depths), 0
+    coating_depths = divide_interval(replace(layout, stop=coating_thickness), min_cells=2)[:-1]
+    return frozen_array(np.concatenate([coating_depths, depths])), coating_depths.size

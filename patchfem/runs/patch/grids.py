@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
+from ...mesh.grading import Layout, RowHeights, divide_into_columns, divide_into_rows
 from ...mesh.grid import TensorGrid
 from ...model.patch import PatchModel
 from ...model.pieces import estimate_rounded_length, extend_grid
@@ -545,14 +545,14 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     for piece in pieces[:1] if patch_model.pieces.are_alike else pieces:
         # The height of a row is at most a tenth of the length, or 1/24 of the height of a tall
         # piece, and never more than 1/6 of the height.
-        rows = divide_piece_into_rows(
-            piece,
-            first_row=first_row,
-            last_row=min(piece.height, length) / 60,
-            coating_row=piece.thickness / 4,
-            max_row=min(max(length / 10, piece.height / 24), piece.height / 6),
+        rows = RowHeights(
+            first=first_row,
+            last=min(piece.height, length) / 60,
+            coating=max(piece.thickness / 4, first_row),
+            largest=min(max(length / 10, piece.height / 24), piece.height / 6),
             growth=growth,
         )
+        rows = divide_into_rows(piece.height, piece.thickness, rows)
         grids.append(extend_grid(patch_model, piece, TensorGrid(x, *rows), 1 + growth))
     return grids
 
@@ -563,32 +563,6 @@ def halve_cells(bodies, count: int = 1) -> list:
     for _ in range(count):
         bodies = [body.refine() for body in bodies]
     return bodies
-
-
-def divide_piece_into_rows(
-    piece, first_row: float, last_row: float, coating_row: float, max_row: float, growth: float
-) -> tuple[np.ndarray, int]:
-    """Return the depths [m] of the element rows of a piece and the number of rows in the coating.
-
-    Parameters
-    ----------
-    piece : PatchPiece
-        Piece with its height and the thickness of its coating.
-    first_row, last_row, coating_row : float
-        Heights [m] of the rows at the interface, at the holder, and at the inner face of the coating, where they are at
-        least `first_row`.
-    max_row : float
-        Largest height of a row [m].
-    growth : float
-        Growth of the height with the distance from these places [1].
-    """
-    height = piece.height
-    coating = piece.thickness
-    bands = [(0.0, 0.0, first_row), (height, height, last_row)]
-    if coating:
-        bands.append((coating, coating, max(coating_row, first_row)))
-    rows = Layout(0.0, height, tuple(bands), (0.0, height), max_row, max_row, growth)
-    return divide_into_rows(rows, coating)
 
 
 def predict_condensing_seconds(bodies) -> float:
