@@ -112,10 +112,10 @@ v = 1979-05-27 07:32:00
 
 @pytest.mark.parametrize(
     "kind, levels, expected",
-    [("base", "2 m/s^2..6 m/s^2:3", [2, 4, 6]), ("force", "1 N..100 N:3", [1, 10, 100])],
+    [("base", "2 m/s^2..6 m/s^2:3", [2, 4, 6]), ("force", "1 N..100 N:3", [1, 50.5, 100])],
 )
 def test_exact_range_of_levels_stands_for_its_values(kind, levels, expected):
-    """A range of levels stands for its values, spaced as those of a sweep; one without a number of values is refused."""
+    """A range of levels stands for its values with equal steps; one without a number of values is refused."""
     drive = f'[drive]\nkind = "{kind}"\nwaveform = "levels"\nfrequency = "143 Hz"\ncycles = 9\n'
     text = RIG.partition("[drive]")[0] + drive
     assert loads(f'{text}levels = "{levels}"\n').drive.levels == pytest.approx(expected)

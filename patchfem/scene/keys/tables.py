@@ -13,7 +13,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from ...effects import LAWS, MAX_RIG_COORDINATES, WAVEFORMS
 from .accuracy import Accuracy
 from .contact import Contact, Grooves
-from .quantities import format_si, parse_quantity
+from .quantities import format_si, parse_quantity, spread_range
 from .types import (
     MAX_MAGNITUDE,
     AbsoluteTemperature,
@@ -495,7 +495,7 @@ class Drive(Table):
     levels: optional(
         array(quantity("acceleration", ge=0)),
         "amplitudes of the base acceleration, or of the force with kind 'force', applied one after the other, also as a "
-        "range such as `2 g..6 g:5`; each level starts from the final state of the previous level",
+        "range of equal steps, such as `2 g..6 g:5`; each level starts from the final state of the previous level",
     )
     frequencies: optional(
         array(Frequency, least=2, most=100),
@@ -549,12 +549,10 @@ class Drive(Table):
 
         `value` are the levels as written. `info` has the keys before this one, among them the kind of drive.
         """
-        if isinstance(value, str):
-            # a range has the rules of those of a sweep, which know all keys
-            from ..assignments import read_values
-
-            key = "drive.force" if info.data.get("kind") == "force" else "drive.acceleration"
-            value = list(read_values(key, value).texts)
+        if isinstance(value, str) and ".." in value:
+            value = spread_range(
+                value, "force" if info.data.get("kind") == "force" else "acceleration"
+            )
         if info.data.get("kind") != "force" or not isinstance(value, list | tuple):
             return value
         forces = [parse_quantity(level, "force") for level in value]
