@@ -11,9 +11,12 @@ Signs: compression, normal stress and load are positive; relative displacement i
 rotation opens the gap at +x.
 """
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +44,7 @@ __all__ = [
     "add_interface_number",
     "compute_allowed_error",
     "frozen_array",
+    "read_measure_rows",
     "remove_interface_number",
 ]
 
@@ -415,9 +419,8 @@ class MeasureDefinition(NamedTuple):
       name; None if only an engine or another kind of run computes it.
     - sample_error: error due to sampling, multiplied by the number of samples per cycle.
     - group: group of related measures: motion, friction, energy, patch or wear.
-    - larger_term: for a measure that is a small difference of larger terms, the name of these terms and a function that
-      returns their size from the measures of the same interface; otherwise None. The tolerance times this size is added
-      to the floor.
+    - larger_term: for a measure that is a small difference of larger terms, the name of these terms; otherwise "". The
+      tolerance times their size (`response.rows.find_larger_term`) is added to the floor.
     - order: order of the sampling error of an exact motion in the sample spacing.
     - minimum: smallest possible value.
     - flags: sets to which the measure belongs, separated by blanks: "main" (the tolerance of a run applies to it),
@@ -425,9 +428,9 @@ class MeasureDefinition(NamedTuple):
       curve), "mesh" (its error controls the mesh), "displacement" (its floor is limited by the displacement of the
       drive), "force" (its floor is limited by the normal load), "error" (it is itself an error), "sine" (it exists only
       under a sine), "loop" (an integral or a peak of samples of the friction loop), "run" (a sum over the whole run),
-      "phase" (an angle modulo pi).
-    - friction_scale: function of an `errors.FrictionScale` that returns the error of the measure for a relative error 1
-      of the friction force; None if this is the value of the measure.
+      "phase" (an angle modulo pi), "scatter" (a statistical mean under a random drive).
+    - friction_scale: name of the size in `response.errors.compute_friction_errors` that is the error of the measure for a
+      relative error 1 of the friction force; "" if this is the value of the measure.
     """
 
     name: str
@@ -437,15 +440,27 @@ class MeasureDefinition(NamedTuple):
     function: Callable[[Any], float | None] | str | None = None
     sample_error: float = 0.0
     group: str = "motion"
-    larger_term: tuple[str, Callable] | None = None
+    larger_term: str = ""
     order: float = 1.0
     minimum: float = -np.inf
     flags: str = ""
-    friction_scale: Callable | None = None
+    friction_scale: str = ""
 
     def has(self, flag: str) -> bool:
         """Return whether a flag is among those of the measure."""
         return flag in self.flags.split()
+
+
+def read_measure_rows(table: str) -> dict[str, MeasureDefinition]:
+    """Read a table of measures.toml, "motion", "internal" or "patch", as MeasureDefinitions by name."""
+    rows = _read_measure_tables()[table].items()
+    return {name: MeasureDefinition(name, **row) for name, row in rows}
+
+
+@cache
+def _read_measure_tables() -> dict[str, dict[str, dict[str, Any]]]:
+    """Read the tables of measures.toml, with the columns of each measure by its name."""
+    return tomllib.loads(Path(__file__).with_name("measures.toml").read_text("utf-8"))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -124,18 +124,24 @@ class ExtendedShooting(Shooting, ABC):
         state = super().unpack(aligned, packed)
         return state._replace(memory=_align(state.memory, -1))
 
+    def find_usable(self, before: State) -> np.ndarray:
+        """Return which entries (k,) of the packed state may be unknowns: all displacements at the ends of a loop.
+
+        The forces there follow from the displacements beside them.
+        """
+        is_used = _find_used(before) & _find_used(self.state)
+        is_used &= _align(before.memory, 1)[:, Memory.STACK :] != 0
+        is_used[:, 1::2] = False
+        return np.append(np.ones(self.n, bool), is_used)
+
     def find_unknowns(self, before: State) -> np.ndarray:
         """Return the indices of the unknowns in the packed state: what a period changes, and all points of a loop.
 
-        A periodic motion leaves the reversal points of its loop as they were, but they move with it. Their forces follow
-        from the displacements beside them.
+        A periodic motion leaves the reversal points of its loop as they were, but they move with it.
         """
-        start = self.pack(before)
-        is_unknown = self.pack(self.state) != start
+        is_unknown = self.find_usable(before)
+        is_unknown[: self.n] = self.state.y[: self.n] != before.y[: self.n]
         is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
-        is_used = _find_used(before) & _find_used(self.state)
-        is_unknown[self.n :] = is_used.ravel() & (start[self.n :] != 0)
-        is_unknown[self.n + 1 :: 2] = False
         is_unknown[self.extra] = True
         return np.flatnonzero(is_unknown)
 

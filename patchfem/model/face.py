@@ -13,10 +13,9 @@ from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
 from ..surface.areal import Areal, fill_nearest, find_scan_spikes, level
 from ..surface.files.read import read_surface
-from .file_cache import cache_by_file
 from .gap import ShapedGap
 from .patch import PatchModel
-from .source import name_key
+from .source import cache_by_file, name_key
 
 SCAN_KEY = "contact.profile.scan"
 # Smallest share of the face that a scan covers; a smaller one says little about the other heights.

@@ -3,24 +3,29 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .. import inputs
 from ..core import InitialState, ModalBasis
-from ..effects import Waveform, find_waveform
+from ..effects import Waveform, find_waveform, import_effect
 from ..scene.rules.methods import find_load_change_key
+from ..structure import drives
 from ..structure.drive_sizes import (
+    DriveKeys,
     count_cycles_per_level,
     count_repeat_cycles,
     estimate_peak_speed,
     find_decay_rate,
     find_drive_omega,
+    find_first_period,
     find_max_acceleration,
 )
-from . import structure_reduced
-from .drive import build_signal
+from . import structure_files
 from .law import InterfaceLaw, build_interface_laws, make_interface_names
+from .source import cache_by_file, name_key
 from .structure import (
     SubtractedJoint,
     build_modes,
@@ -36,9 +41,8 @@ from .structure import (
 )
 
 if TYPE_CHECKING:
-    from ..scene.keys.tables import Friction
     from ..structure.drives import DriveSignal
-    from .patch import PatchModel
+    from .model import Model
 
 # Largest displacement [m] up to which a motion that grows without bound is computed.
 MAX_COMPUTED_DISPLACEMENT = 1e3
@@ -179,14 +183,6 @@ class FirstMode:
         return float(np.ptp(slides[:, 1:], axis=0).max(initial=0.0)) / whole_range
 
 
-class JointModel(Protocol):
-    """Model of another scene (`model.Model`), of which the solution of its joint needs the patch and the law."""
-
-    patch: "PatchModel"
-    friction: "Friction"
-    rig: "Rig"
-
-
 class BoltedJoint(NamedTuple):
     """Joint that was bolted when the modes of a rig were measured.
 
@@ -206,7 +202,7 @@ class BoltedJoint(NamedTuple):
     subtracted: SubtractedJoint | None = None
     build_rig: "Callable[[SubtractedJoint], Rig] | None" = None
     build_stiffer_rig: "Callable[[SubtractedJoint], Rig] | None" = None
-    model: JointModel | None = None
+    model: "Model | None" = None
     stuck_stiffness: float | None = None
 
 
@@ -324,7 +320,7 @@ def build_rig(scene, joint: SubtractedJoint | None = None) -> Rig:
     rig = _build(scene, build_modes_without_bond(scene, joint), interfaces, joint)
     if scene.structure.reduced is None:
         return rig
-    reduced = structure_reduced.build_reduced_modes(scene)
+    reduced = structure_files.build_reduced_modes(scene)
     structure = replace(
         rig.structure,
         other_rigs=tuple(_build(scene, modes, interfaces) for modes in reduced.other_modes),
@@ -407,6 +403,54 @@ def build_drive(scene, modes: ModalBasis) -> RigDrive:
         force=keys.force if keys.kind == "force" else None,
         levels=levels,
     )
+
+
+def build_signal(scene, modes: ModalBasis):
+    """Build the drive signal of a scene in the form that the solvers use.
+
+    A displacement amplitude X of the base becomes the acceleration amplitude X omega^2, and a force F
+    becomes F over the modal mass. A drive without a frequency of its own gets its cycle from the
+    first elastic mode.
+    """
+    if scene.drive.kind == "free":
+        return drives.make_release(find_first_period(modes))
+    keys = DriveKeys(
+        scene.drive, modes.mass, find_first_period(modes), lambda: _read_recorded_drive(scene)
+    )
+    waveform = scene.drive.waveform
+    return import_effect(f"drive.waveform={waveform}").DRIVE_BUILDERS[waveform](keys)
+
+
+def _read_recorded_drive(scene) -> tuple[np.ndarray, np.ndarray]:
+    """Read both columns (k,) of the file drive.file of a scene.
+
+    They are time [s] and signal, or frequency [Hz] and spectral density. The signal is an acceleration [m s-2] or a
+    force [N], by the kind of the drive.
+    """
+    path = scene.resolve_path(scene.drive.file)
+    with name_key("drive.file"):
+        if find_waveform(scene.drive).is_random:
+            return inputs.signals.read_spectrum(path)
+        return read_drive_file(path, scene.drive.kind)
+
+
+@cache_by_file
+def read_drive_file(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Read a recorded drive signal.
+
+    Parameters
+    ----------
+    path : Path
+        File to read.
+    kind : str
+        ``"base"`` for an acceleration of the base, else the file contains a force.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Time (k,) [s] from 0 on, and acceleration (k,) [m s-2] or force (k,) [N].
+    """
+    return inputs.signals.read_signal(path, "acceleration" if kind == "base" else "force")
 
 
 def _build_springs(structure, modes: ModalBasis) -> RigSprings:

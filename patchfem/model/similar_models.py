@@ -15,9 +15,9 @@ import numpy as np
 from ..core import frozen_array
 from ..scene.rules.methods import find_motion_features
 from . import patch as patches
-from .load import build_point_load
 from .model import Model, write_resolved
 from .rig import build_drive, build_rig
+from .slide import build_point_load
 from .source import SceneWriter, locate_errors
 
 if TYPE_CHECKING:

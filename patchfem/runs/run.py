@@ -274,11 +274,14 @@ class _Passes:
     def _wear_patch(self, inputs: RunInputs) -> "evolve.WornPatch":
         """Compute the wear of a patch, continuing from a saved state if there is one; without a file no state is saved."""
         model = inputs.plan.model
+        patch, *coarse = inputs.patches[:3]
         file = self.state_file
-        key = file and hash_run(model, inputs.patch, file.version)
-        return evolve.compute_and_save_wear(
-            file, key, model, inputs.patch, inputs.coarse[:2], inputs.progress
-        )
+        if file is None:
+            return evolve.compute_wear(model, patch, coarse, inputs.progress)
+        key = hash_run(model, patch, file.version)
+        initial = evolve.load_wear_state(file.path, key) if file.resume else None
+        store = partial(evolve.save_wear_state, file.path, key)
+        return evolve.compute_wear(model, patch, coarse, inputs.progress, initial, store)
 
     def _saving_context(self, run_plan: Plan, patch):
         """Return a context in which marches save their states; one that does nothing without them.

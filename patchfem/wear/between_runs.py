@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..formatting import format_length
-from ..model.earlier_wear import GAP_DIFFERENCE_FRACTION, LOADING_KEYS
+from ..model.wear import GAP_DIFFERENCE_FRACTION, LOADING_KEYS
 from ..surface.quantity import Quantity
 
 # Width of the worn part divided by that of its floor, the deepest fifth

@@ -80,7 +80,7 @@ def sample_slide_densely(done, begin: float, samples: int = 20_000) -> np.ndarra
     model = done.plan.model
     rig = done.plan.model.rig
     times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD
-    law = problems.make_coulomb(*model.friction_limits(model.point.load))
+    law = problems.make_coulomb(*model.rig.friction.interfaces[0].friction_limits(model.point.load))
     motion = problems.run_motion(rig.modes, rig.drive.signal, [law], rig.drive.cycles, times)
     response = motion.make_response(rig.modes, rig.drive.signal)
     return response.slide[np.searchsorted(response.time, times)]

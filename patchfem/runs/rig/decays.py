@@ -49,29 +49,23 @@ MAX_POOLED_RATIO = 1.6
 ERROR_TO_CHANGE = 2.0
 
 
-def compute_decay_curve(solution: Solution) -> DecayCurve | None:
+def compute_decay_curve(solution: Solution, coarser) -> DecayCurve | None:
     """Compute the decay curve of a released rig with error estimates; None if it has no points.
 
     The errors are those of the evaluation plus the changes in the coarse runs at the same
     amplitude. They are infinite outside the range of a coarse run. Points with a relative error
-    above MAX_DECAY_POINT_ERROR are removed.
+    above MAX_DECAY_POINT_ERROR are removed. `coarser` are pairs of a coarse run and its reference run, None for this run.
     """
     curve = _measure_decay_curve(solution)
     if not curve.time.size:
         return None
-    curve = _add_coarse_run_errors(curve, solution)
+    for run, beside in coarser:
+        reference = curve if beside is None else _measure_decay_curve(beside)
+        curve = curve.add_change(_measure_decay_curve(run), reference)
     known = (curve.frequency_error <= MAX_DECAY_POINT_ERROR * curve.frequency) & (
         curve.damping_error <= MAX_DECAY_POINT_ERROR * np.abs(curve.damping)
     )
     return curve.select(known) if known.any() else None
-
-
-def _add_coarse_run_errors(curve: DecayCurve, solution: Solution) -> DecayCurve:
-    """Add the differences of the curve in coarse runs, with fewer steps or modes, to the errors of a decay curve."""
-    for run, beside in solution.coarser:
-        reference = curve if beside is None else _measure_decay_curve(beside)
-        curve = curve.add_change(_measure_decay_curve(run), reference)
-    return curve
 
 
 def _measure_decay_curve(run: Solution) -> DecayCurve:
@@ -80,7 +74,7 @@ def _measure_decay_curve(run: Solution) -> DecayCurve:
     After the last slip, the curve is that of the strongest mode of the free vibration, because the
     reversals of a sum of several modes belong to none of them.
     """
-    motion = run.response
+    motion = run.run.response
     mode = run.tail
     reversals = locate_reversals(motion.time, motion.output, motion.output_rate)
     half_cycles = fit_decay_curve(make_half_cycles(*reversals))

@@ -8,8 +8,7 @@ import numpy as np
 
 from ... import friction, slip
 from ...effects import law_has_trait, needs_bond_list
-from ..bench import averaged_law
-from ..bench import shear as bench_shear
+from ..interfaces import averaged_law, contact_points
 from ..patch import jenkins_elements
 from ..results.interfaces import Face
 from ..results.patch_rows import Arrays
@@ -38,11 +37,11 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     """
     sigma = patch.pressure.sigma_n
     f = model.friction
-    window = solution.window
+    window = solution.run.window
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)
     # A motion without snapshots is that of a single point.
-    snapshots = solution.snapshots
+    snapshots = solution.run.snapshots
     n_samples = len(window.time)
     first = max(0, n_samples - 1 - n_samples // numerics.window)
     samples = np.linspace(first, n_samples - 1, N_INTERFACE_FRAMES).round().astype(int)
@@ -62,7 +61,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         has_nodes = is_below or (has_shear and solution.contact.elements is None)
 
     if has_nodes or (has_shear and model.grooves is not None):
-        tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
+        tau, local = contact_points.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
         length = friction.record.make_law(f, patch.pressure.load).length
         elements = (solution.contact.reduction, length)
@@ -144,7 +143,7 @@ def _collect_varying_load_fields(patch, solution) -> Arrays:
     # The first frame is the pressed patch at rest; the others are snapshots of the motion.
     sets = solution.contact.sets
     weight = patch.pieces.interface.weight
-    snapshots = solution.snapshots
+    snapshots = solution.run.snapshots
     time = np.array([0.0, *(snapshot.time for snapshot in snapshots)])
     slide = np.array([0.0, *(snapshot.slide for snapshot in snapshots)])
     nodal = np.stack([patch.pressure.sigma_n * weight, *(snapshot.nodal for snapshot in snapshots)])

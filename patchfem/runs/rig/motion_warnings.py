@@ -25,9 +25,9 @@ from ...response.outcome import (
 )
 from ...response.rows import AMPLITUDE
 from ..bench import bench
+from ..interfaces import joints
 from ..results.interfaces import Face, merge_sentences, warn_of_large_slide
 from ..results.notes import LAW_NOTES, LAW_WARNINGS
-from . import joints
 from .engines import ENGINES, find_obstacle_of_map
 
 # Number of cycles that are added to see whether the last loop of a bench is steady.
@@ -86,10 +86,10 @@ def _warn_of_engine(run) -> Iterator[str]:
     """
     solution = run.solution
     yield from note_on_changing_drive(run.outcome, run.drive)
-    yield from solution.notes
+    yield from solution.steady.notes if solution.steady else ()
     yield from _warn_of_ringing(run)
-    if solution.message and solution.outcome is not Outcome.LEAVES_GROOVES:
-        yield solution.message
+    if solution.run.message and solution.run.outcome is not Outcome.LEAVES_GROOVES:
+        yield solution.run.message
 
 
 def _warn_of_ringing(run) -> Iterator[str]:
@@ -99,7 +99,7 @@ def _warn_of_ringing(run) -> Iterator[str]:
         return
     tolerance = model.accuracy.tolerance
     rate = structure.drive_sizes.find_min_decay_rate(model.rig.modes)
-    ringing = find_ringing(run.solution, run.measures, (tolerance, rate), run.drive)
+    ringing = find_ringing(run.solution.run, run.measures, (tolerance, rate), run.drive)
     if ringing:
         limits = (tolerance, rate * run.drive.period)
         ratio = ringing / run.measures[AMPLITUDE].value
@@ -157,7 +157,7 @@ def _warn_of_large_slides(run) -> list[str]:
     return merge_sentences(
         run.model,
         run.inputs.faces,
-        lambda face: warn_of_large_slide(face.patch, face.slide(run.solution.response)),
+        lambda face: warn_of_large_slide(face.patch, face.slide(run.solution.run.response)),
     )
 
 
@@ -185,7 +185,7 @@ def _compute_loop_closing_error(fine) -> float:
 def _warn_of_open_loop(run) -> list[str]:
     """Return a list with a warning if the last friction loop of a bench is not closed, nor its area that of a longer run."""
     model = run.model
-    fine = run.solution.response
+    fine = run.solution.run.response
     tolerance = model.accuracy.tolerance
     slide = model.slide
     if slide.period is None or slide.cycles < 1 or not fine.values.get("loop_area"):
@@ -219,7 +219,7 @@ def _warn_of_open_loop(run) -> list[str]:
 
 def _warn_of_overhang(run) -> Iterator[str]:
     """Warn if the upper piece of a bench slides off the loaded area."""
-    load = run.solution.response.load
+    load = run.solution.run.response.load
     load_loss = 1 - float(load.min() / load[0]) if load[0] > 0 else 0.0
     if run.patch is not None and load_loss > 0.01:
         yield (
@@ -239,12 +239,13 @@ def _note_on_fields_of_bands(run) -> Iterator[str]:
 
 def _note_on_elements_without_slip(run) -> Iterator[str]:
     """Note that a steady motion is not unique if some elements of the joint never slip in it."""
-    is_steady = run.solution.outcome in (Outcome.STEADY, Outcome.STUCK) and run.has_friction
+    is_steady = run.solution.run.outcome in (Outcome.STEADY, Outcome.STUCK) and run.has_friction
     is_found = ENGINES[run.numerics.engine].finds_periodic_motion
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
         return
-    slides = run.solution.window.slides.T
-    for joint, slide in zip(joints.list_joints(run.model, run.patch, run.numerics.meshed), slides):
+    slides = run.solution.run.window.slides.T
+    listed = joints.list_joints(run.model, run.patch, run.numerics.meshed)
+    for joint, slide in zip(chain.from_iterable(one.split_by_bands() for one in listed), slides):
         _, yields = joint.list_elements()
         largest_yield = float(yields.max(initial=0.0))
         amplitude = float(np.ptp(slide)) / 2
@@ -260,11 +261,11 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
 
 def _note_on_smallest_slip_of_onset(run) -> Iterator[str]:
     """Note the smallest slip that counts as the onset, in a run of drive levels whose interface is elastic in stick."""
-    solution = run.solution
+    found = run.solution.levels
     is_by_slip = run.model.rig.drive.levels.onset[0] == "slip"
-    if solution.levels and is_by_slip and solution.stick_tolerance > 0:
+    if found is not None and is_by_slip and found.stick_tolerance > 0:
         yield (
-            f"onset_level: slip counts only if its amplitude is above {format_length(solution.stick_tolerance)}, "
+            f"onset_level: slip counts only if its amplitude is above {format_length(found.stick_tolerance)}, "
             "a thousandth of the elastic range of the interface; a part of the interface may slip earlier"
         )
 
@@ -283,8 +284,9 @@ def _note_on_end(run) -> Iterator[str]:
     """Note on the neglected lateral motion of a face that yaws, and on an end at the grooves, which is no defect."""
     if run.model.rig.friction.bands_slide_apart:
         yield "the yaw also moves the ends of the patch across x; this motion and its friction are neglected"
-    if run.solution.message and run.solution.outcome is Outcome.LEAVES_GROOVES:
-        yield run.solution.message
+    motion = run.solution.run
+    if motion.message and motion.outcome is Outcome.LEAVES_GROOVES:
+        yield motion.message
 
 
 SLIDE_WARNINGS = (*LAW_WARNINGS, _warn_of_open_loop, _warn_of_overhang, _warn_of_large_slides)

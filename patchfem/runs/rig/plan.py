@@ -14,7 +14,7 @@ from ...effects import law_has_trait
 from ...model.model import Model
 from ...response.measures import Values
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
-from . import bond_lists
+from ..interfaces import bond_lists
 from .engines import choose_numerics
 
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as

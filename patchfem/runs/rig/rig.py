@@ -11,7 +11,8 @@ from math import ceil, floor, log, log2
 import numpy as np
 
 from ... import structure
-from ...core import NotConverged, Outcome, PatchfemError
+from ...convergence import convergence_error
+from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...model import rig as model_rig
 from ...response import reasons, stationary
 from ...response.decay_curve import DecayCurve
@@ -30,31 +31,29 @@ from ...response.rows import set_final_floors
 from ...response.settling import find_slip_period
 from .. import refine
 from ..bench import bench
+from ..bench import engine as bench_engine
+from ..bench.engine import MIN_RELATIVE_STEP_ERROR, Numerics
+from ..interfaces import bond_lists
 from ..results.interfaces import check_pieces_overlap
 from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, Settings, Shortage
-from . import bond_lists, comparisons, decays, event_to_event, flutter, march, slides
+from . import comparisons, decays, event_to_event, flutter, levels, march, slides
 from . import fields as interface_fields
-from .engines import (
-    ENGINES,
-    HYBRID,
-    MARCH,
-    MAX_MARCH_STEPS_PER_CYCLE,
-    MIN_RELATIVE_STEP_ERROR,
-    Numerics,
-    choose_numerics,
-    make_bench_numerics,
-)
-from .evaluation import (
-    Solution,
-    add_level_errors,
-    compute_peak_frequency,
-    convert_to_scene_units,
-    first_interface_load,
-    measure_onset_level,
-    replace_output_by_gauge,
-)
+from .engines import ENGINES, HYBRID, MARCH, MAX_MARCH_STEPS_PER_CYCLE, choose_numerics
+from .evaluation import Solution, first_interface_load, replace_output_by_gauge
 from .motion_warnings import collect_remarks
 from .steady import shooting
+
+# Outcomes of runs that ended early; more steps do not change them.
+EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
+MAX_REFINED_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
+# Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
+MIN_MOTION_RELATIVE_ERROR = 1e-9
+# Largest number of steps times nodes of a run that is repeated with smaller steps for measures that are not main ones. It
+# takes some 0.1 s of CPU time. The entries of a list of bonds count as nodes.
+MAX_NODE_STEPS_FOR_OTHER_MEASURES = 1e6
+# Work of a step in which the pressure of a patch is solved, relative to that of another step.
+PRESSING_STEP_WORK_RATIO = 40.0
+NO_PEAK_REASON = "the output does not move at any of the swept frequencies, so there is no peak"
 
 
 def solve_rig(model, numerics, patch, n_frames: int = 0, say=None, progress=None) -> Solution:
@@ -119,17 +118,18 @@ class Runner:
         self.solutions: dict[Numerics, Solution] = {}
         self._done = 0.0  # reported fraction of all runs
 
-    def solve(self, numerics: Numerics, say=None) -> Solution:
-        """Solve the rig on its finest meshes, and store the frames of the interface that its result shows."""
-        has_fields = self.patches[0] is not None or self.model.has_interface_patches
-        return self._solve(
-            self.model, numerics, self.patches[0], N_INTERFACE_FRAMES * has_fields, say
-        )
+    def solve(self, numerics: Numerics, say=None, n_frames: int = 0) -> Solution:
+        """Solve the rig, and report the completed fraction of all runs.
 
-    def _solve_coarse_run(self, numerics: Numerics) -> Solution:
-        """Solve the rig with the settings of a comparison run, without frames of the interface.
-
-        The settings say what is coarser: the mesh, the modes of a reduced structure, or a joint whose stiffness differs.
+        Parameters
+        ----------
+        numerics : Numerics
+            Settings, which also say what is coarser: the mesh, the modes of a reduced structure, or a joint whose
+            stiffness differs.
+        say : callable, optional
+            Function that takes a line of text on the progress.
+        n_frames : int
+            Number of frames of the interface in the last cycle.
         """
         model = self.model
         patch = self.patches[numerics.coarse_patch]
@@ -138,25 +138,7 @@ class Runner:
         if numerics.stiffer_joint:
             stiffer, (patch, *_) = self.stiffer[:2]
             model = replace(stiffer, rig=replace(stiffer.rig, drive=model.rig.drive))
-        # The decay curve needs histories from the start of the run.
-        return self._solve(model, replace(numerics, whole=self.is_release), patch)
 
-    def _solve(self, model, numerics: Numerics, patch, n_frames: int = 0, say=None) -> Solution:
-        """Solve a rig, and report the completed fraction of all runs.
-
-        Parameters
-        ----------
-        model : Model
-            Model of the rig.
-        numerics : Numerics
-            Cycles, steps and other settings of the run.
-        patch : Patch or None
-            Solved patch.
-        n_frames : int
-            Number of frames of the fields in the last cycle.
-        say : callable, optional
-            Function that takes a line of text on the progress.
-        """
         # Each run is a half of what is left, because the number of coarse runs is not known.
         left = 1 - self._done
         share = left if self.is_single else left / 2
@@ -172,19 +154,12 @@ class Runner:
 
     def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
         """Estimate the errors of a run from coarse runs (`response.errors.estimate_errors`)."""
-        return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)
 
+        def solve(numerics: Numerics) -> Solution:
+            """Solve a coarse run; the decay curve needs histories from its start."""
+            return self.solve(replace(numerics, whole=self.is_release))
 
-# Outcomes of runs that ended early; more steps do not change them.
-EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
-MAX_REFINED_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
-# Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
-MIN_MOTION_RELATIVE_ERROR = 1e-9
-# Largest number of steps times nodes of a run that is repeated with smaller steps for measures that are not main ones. It
-# takes some 0.1 s of CPU time. The entries of a list of bonds count as nodes.
-MAX_NODE_STEPS_FOR_OTHER_MEASURES = 1e6
-# Work of a step in which the pressure of a patch is solved, relative to that of another step.
-PRESSING_STEP_WORK_RATIO = 40.0
+        return estimate_errors(solve, solution.values, runs, self.solutions)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -198,6 +173,7 @@ class CoupledRun:
     - outcome: Outcome, or None before `complete_measures`.
     - decay: decay curve of a release, or None.
     - notes: sentences on the decay and on limit cycles.
+    - coarser: pairs of a coarse run and its reference run, None for this run, for decay curves and onsets.
     """
 
     inputs: RunInputs
@@ -208,6 +184,7 @@ class CoupledRun:
     outcome: Outcome | None = None
     decay: DecayCurve | None = None
     notes: tuple[str, ...] = ()
+    coarser: tuple[tuple[Solution, Solution | None], ...] = ()
 
     @property
     def model(self):
@@ -222,7 +199,8 @@ class CoupledRun:
     @property
     def drive(self):
         """Drive at which the measures are evaluated."""
-        return self.solution.drive or self.model.rig.drive.signal
+        steady = self.solution.steady
+        return (steady and steady.drive) or self.model.rig.drive.signal
 
     @property
     def has_friction(self) -> bool:
@@ -232,18 +210,21 @@ class CoupledRun:
     @property
     def settings(self) -> Settings:
         """Numerical settings that the run used, which its result states."""
-        solution = self.solution
         numerics = self.numerics
-        settings = solution.settings
-        if self.model.rig is not None:
-            settings = settings._replace(engine=numerics.engine, window_cycles=numerics.window)
-            if solution.bond_summation is not None:
-                settings = settings._replace(quadrature=solution.bond_summation.engine)
-        if ENGINES[numerics.engine].has_steps:
+        engine = ENGINES[numerics.engine]
+        choice = comparisons.find_bond_summation(self.model, numerics)
+        settings = Settings(numerics.engine, window_cycles=numerics.window)
+        if self.model.rig is None:
+            settings = Settings(bench_engine.name_engine(self.model, choice))
+        elif choice is not None:
+            settings = settings._replace(quadrature=choice.engine)
+        if engine.has_steps:
             settings = settings._replace(steps_per_cycle=numerics.steps)
+        if engine.finds_periodic_motion and self.solution.run.outcome is not Outcome.LEAVES_GROOVES:
+            settings = settings._replace(map="shooting")
 
         # A patch that slips part by part is a set of elements, or of shear modes if its load varies.
-        reduced = getattr(solution.contact, "reduction", None)
+        reduced = getattr(self.solution.contact, "reduction", None)
         if reduced is None:
             return settings
         size = int(np.size(reduced.stiffness))
@@ -258,12 +239,12 @@ class CoupledRun:
         limit = 0.0
         if self.has_friction and not varies:
             limit = self.model.friction.static * first_interface_load(self.model, self.patch)
-        return float(np.abs(self.solution.response.force).max()) / limit if limit > 0 else 0.0
+        return float(np.abs(self.solution.run.response.force).max()) / limit if limit > 0 else 0.0
 
     @property
     def has_errors(self) -> bool:
         """Whether errors are estimated: the caller wants them, the motion was found, and all meshes for them exist."""
-        is_solved = self.solution.outcome is not Outcome.NOT_CONVERGED
+        is_solved = self.solution.run.outcome is not Outcome.NOT_CONVERGED
         return self.inputs.estimate and is_solved and self.inputs.has_error_meshes
 
 
@@ -317,8 +298,10 @@ def _run_rig(inputs: RunInputs) -> Result:
         run, shortage = run_refined(inputs, choose_numerics(model, MARCH))
 
     # The reasons of missing values depend on the outcome, so that they come after it.
-    if run.solution.levels and run.has_friction:
-        onset = measure_onset_level(rig, run.solution, model.accuracy.tolerance)
+    found = run.solution.levels
+    if found is not None and run.has_friction:
+        tolerance = model.accuracy.tolerance
+        onset = levels.measure_onset_level(rig, found, run.coarser, tolerance)
         run = replace(run, measures=run.measures | {"onset_level": onset})
     run = complete_measures(run)
     if rig.drive.kind == "free" and run.has_errors:
@@ -334,6 +317,7 @@ def _make_result(run: CoupledRun) -> Result:
     inputs = run.inputs
     model = run.model
     solution = run.solution
+    motion = solution.run
 
     # Warnings and notes see the measures before their floors are raised to the tolerance.
     warnings, notes = collect_remarks(run)
@@ -342,23 +326,20 @@ def _make_result(run: CoupledRun) -> Result:
     if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
         measures = reasons.find_missing_unbounded(measures)
     if model.rig is not None and model.rig.drive.waveform.is_random:
-        notes += stationary.warn_if_short(measures, solution.window)
+        notes += stationary.warn_if_short(measures, motion.window)
 
     # The fields of [contact], and those of the patches of [[structure.interface]].
     fields = {}
     if inputs.patch is not None and model.rig is None:
-        fields = slides.collect_slide_frames(model, inputs.patch, solution.response)
+        fields = slides.collect_slide_frames(model, inputs.patch, motion.response)
     elif inputs.patch is not None:
         fields = interface_fields.collect_interface_fields(
             model, run.numerics, inputs.patch, solution
         )
     moved = ()
     if model.has_interface_patches:
-        snapshots = [
-            frame
-            for frame in solution.snapshots
-            if isinstance(frame, event_to_event.ElementSnapshot)
-        ]
+        is_hybrid = not ENGINES[run.numerics.engine].has_steps
+        snapshots = motion.snapshots if is_hybrid else ()
         moved = interface_fields.add_slip_fields(model, inputs.faces, snapshots)
 
     return Result(
@@ -370,8 +351,8 @@ def _make_result(run: CoupledRun) -> Result:
         notes=notes,
         patch=inputs.patch,
         fields=fields,
-        response=solution.response,
-        window=solution.response if model.rig is None else solution.window,
+        response=motion.response,
+        window=motion.response if model.rig is None else motion.window,
         settings=run.settings,
         motion=_collect_motion(run),
         faces=moved,
@@ -398,7 +379,7 @@ def estimate_slide_errors(model, patches, run: "bench.BenchRun", steps: int) -> 
         Source of the error, and errors by measure.
     """
     solution = slides.make_slide_solution(run)
-    numerics = make_bench_numerics(model, steps, run.engine)
+    numerics = replace(run.numerics, steps=steps)
     runs = comparisons.list_time_runs(numerics)
     runs += comparisons.list_space_runs(model, numerics, patches[0], len(patches) - 1, solution)
     return Runner(model, patches).estimate_errors(runs, solution)
@@ -430,16 +411,17 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
     runner = Runner(
         model, inputs.patches, inputs.stiffer, inputs.progress, is_single=not inputs.estimate
     )
-    first = runner.solve(numerics, inputs.say)
-    inputs.seconds.update({stage: first.seconds} | (first.prepare or {}))
+    n_frames = N_INTERFACE_FRAMES * (inputs.patch is not None or model.has_interface_patches)
+    first = runner.solve(numerics, inputs.say, n_frames)
+    inputs.seconds.update({stage: first.seconds} | first.prepare)
 
     # On a belt, the window must contain a complete stick-slip period, which the first run shows.
     n_cycles = 0 if rig is None else _count_slip_period_cycles(model, numerics, first)
     if n_cycles > numerics.window:
         numerics = replace(numerics, window=n_cycles)
-        first = runner.solve(numerics, inputs.say)
-    if not inputs.estimate or first.outcome is Outcome.NOT_CONVERGED:
-        measures = add_errors(first.values, size=size) | compute_peak_frequency(first)
+        first = runner.solve(numerics, inputs.say, n_frames)
+    if not inputs.estimate or first.run.outcome is Outcome.NOT_CONVERGED:
+        measures = add_errors(first.values, size=size) | _find_peak_frequency(first)
         return CoupledRun(inputs, numerics, first, measures), None
 
     # Comparison runs on coarser meshes, with other modes and with other joints; more steps do not repeat them.
@@ -456,7 +438,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
         if coarser is not None:
             # This run has twice the steps of the one before, with which it is compared.
             runner.solutions[coarser.numerics] = coarser.solution
-            solution = runner.solve(numerics, inputs.say)
+            solution = runner.solve(numerics, inputs.say, n_frames)
             inputs.seconds[stage] = solution.seconds
         time_runs = comparisons.list_time_runs(numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
@@ -464,14 +446,26 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
         measures = add_errors(
             solution.values, errors, min_relative_error=MIN_MOTION_RELATIVE_ERROR, size=size
         )
-        if solution.levels or runner.is_release:
-            coarser_runs = [*time_runs, *space_runs]
-            solution = _add_level_errors(solution, coarser_runs, runner.solutions)
-        return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
+        run = CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
+        if solution.levels is None and not runner.is_release:
+            return run
+
+        # An entry without coarse runs is skipped if the errors of the levels already include it. Runs with another bond
+        # summation are not used for the errors of decay curves and onsets.
+        solved = runner.solutions
+        used_runs = [one for one in (*time_runs, *space_runs) if one.runs or not solution.steady]
+        pairs = []
+        for one in used_runs:
+            if one.runs and one.runs[0].choice is None:
+                pairs.append((solved[one.runs[0]], one.reference and solved[one.reference]))
+        if solution.levels is not None:
+            found = levels.add_level_errors(solution.levels, used_runs, solved)
+            solution = replace(solution, levels=found)
+        return replace(run, solution=solution, coarser=tuple(pairs))
 
     run, shortage = refine.refine(solve, numerics, _judge, inputs.limit)
     inputs.seconds["error"] = sum(solution.seconds for solution in runner.solutions.values())
-    peak = compute_peak_frequency(run.solution, runner.solutions.values())
+    peak = _find_peak_frequency(run.solution, runner.solutions.values())
     return replace(run, measures=run.measures | peak), shortage
 
 
@@ -485,7 +479,7 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
     drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or structure.drive_sizes.is_periodic(drive):
         return 0
-    response = solution.response
+    response = solution.run.response
     n_cycles = ceil(find_slip_period(response.time, response.slide_rate) / drive.period)
     return n_cycles if 2 * n_cycles <= numerics.cycles else 0
 
@@ -502,7 +496,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     if not max_passes:
         return refine.Verdict(0.0)
     # Work of the run: steps times nodes, and more if each step presses the patch.
-    counters = run.solution.book
+    counters = run.solution.run.ledger
     pressed = [face.patches[0] for face in run.inputs.faces]
     nodes = max(
         1.0,
@@ -544,38 +538,31 @@ def _count_finer_passes(run: CoupledRun) -> int:
     if (
         not ENGINES[numerics.engine].has_steps
         or run.model.accuracy.steps_per_cycle is not None
-        or run.solution.outcome in EARLY_OUTCOMES
+        or run.solution.run.outcome in EARLY_OUTCOMES
     ):
         return 0
     max_steps = min(MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS / numerics.cycles)
     return max(0, floor(log2(max_steps / numerics.steps)))
 
 
-def _add_level_errors(
-    solution: Solution, coarser_runs: ComparisonRuns, solutions: dict[Numerics, Solution]
-) -> Solution:
-    """Add errors from coarse runs to the drive levels of a Solution.
+def _find_peak_frequency(solution: Solution, coarser=()) -> Measures:
+    """Return a dict with the frequency [Hz] of the peak of a response curve and its error; {} without a curve.
 
-    Parameters
-    ----------
-    solution : Solution
-        Solution of the finest run.
-    coarser_runs : list of CoarserRuns
-        Settings of the coarse runs by source of error.
-    solutions : dict
-        Solution of each coarse run by its Numerics.
+    The measure has no value if the amplitude is 0. The shift of the peaks of `coarser` runs is part of the error.
     """
-    # An entry without coarse runs is skipped if the errors of the levels already include it.
-    used_runs = [kind for kind in coarser_runs if kind.runs or solution.errors is None]
-    pairs = []
-    for kind in used_runs:
-        # Runs with another bond summation are not used for the errors of decay curves and onsets.
-        if kind.runs and kind.runs[0].choice is None:
-            pairs.append((solutions[kind.runs[0]], kind.reference and solutions[kind.reference]))
-    level_results = ()
-    if solution.levels:
-        level_results = add_level_errors(solution.levels, used_runs, solutions)
-    return replace(solution, levels=level_results, coarser=tuple(pairs))
+    steady = solution.steady
+    if steady is None or np.isnan(steady.peak_error):
+        return {}
+    if np.isinf(steady.peak_error):
+        return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK_REASON)}
+    peak, *others = [
+        float(one.steady.drive.omega / (2 * np.pi))
+        for one in (solution, *coarser)
+        if one.steady.drive is not None
+    ]
+    shift = float(np.abs(np.array(others) - peak).max(initial=0.0))
+    error = steady.peak_error + convergence_error(shift)
+    return {"peak_frequency": Measure(peak, "Hz", error, 0.0)}
 
 
 # ---- completion
@@ -595,7 +582,7 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
         measures = remove_errors(measures)
     repeat = rig.count_repeat_cycles(model.point)
     outcome, steady = judge_outcome(
-        solution,
+        solution.run,
         measures,
         (model.accuracy.tolerance, structure.drive_sizes.find_decay_rate(rig.modes)),
         run.drive,
@@ -611,13 +598,13 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
     ):
         outcome = Outcome.GROWS
     # A growing motion has no final values, so the errors of its measures are unknown.
-    if outcome is Outcome.GROWS and solution.outcome is not Outcome.GROWS:
+    if outcome is Outcome.GROWS and solution.run.outcome is not Outcome.GROWS:
         measures = remove_errors(measures)
     # The motion is judged at the accelerometer, so that its steady amplitude is not that of a gauge.
     if rig.modes.gauge is None:
         measures |= steady
 
-    window = solution.window
+    window = solution.run.window
     is_rigid = run.has_friction and model.sticks_rigidly
     motion = (window, run.drive, repeat)
     measures |= reasons.find_invalid(measures, motion, outcome, is_rigid=is_rigid)
@@ -633,7 +620,7 @@ def _add_decay_curve(run: CoupledRun) -> CoupledRun:
     """
     model = run.model
     solution = run.solution
-    run = replace(run, decay=decays.compute_decay_curve(solution))
+    run = replace(run, decay=decays.compute_decay_curve(solution, run.coarser))
     has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
     if run.decay is None or not has_partial_slip:
         return run
@@ -662,7 +649,7 @@ def _find_final_outcome(run: CoupledRun) -> Outcome:
     """Return the outcome of a run, or LEAVES_CONTACT if the slide at an interface exceeds the overlap of its pieces."""
     outcome = run.outcome
     for face in run.inputs.faces:
-        slide = face.slide(run.solution.response)
+        slide = face.slide(run.solution.run.response)
         outcome = check_pieces_overlap(outcome, face.model.patch, face.patch, slide)
     return outcome
 
@@ -675,14 +662,16 @@ def _collect_motion(run: CoupledRun) -> MotionData:
     drive = run.model.rig.drive
     spectra = None
     if drive.waveform.is_random:
-        spectra = stationary.compute_spectra(solution.window, drive.signal)
+        spectra = stationary.compute_spectra(solution.run.window, drive.signal)
     return MotionData(
         period=run.drive.period,
-        energies=solution.book,
+        energies=solution.run.ledger,
         step_runs=run.step_runs,
-        levels=convert_to_scene_units(run.model.rig, solution.levels),
-        events=solution.log,
+        levels=levels.convert_to_scene_units(
+            run.model.rig, solution.levels.levels if solution.levels else ()
+        ),
+        events=solution.run.log,
         decay=run.decay,
         spectra=spectra,
-        steady=solution.periodic,
+        steady=solution.steady and solution.steady.data,
     )
