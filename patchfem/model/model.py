@@ -5,14 +5,14 @@ No module after this folder knows a Scene.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
 from math import prod
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..core import PatchfemError
+from ..core import PatchfemError, array_dataclass
 from ..effects import law_has_trait, list_absent_effects, needs_bond_list
 from ..formatting import format_quantity
 from ..scene.keys.memoize import memoize
@@ -27,7 +27,7 @@ from .source import SceneWriter, Source, locate_errors
 if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
     from ..friction.grooves import Grooves
-    from .patch import PatchModel
+    from .patch import PatchArea, PatchModel
     from .rig import BoltedJoint, Rig
     from .slide import PointLoad, SlidePath
     from .wear import WearModel
@@ -52,7 +52,7 @@ class MeasuredFile(NamedTuple):
     cutoff: float | None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Model:
     """Problem that a run solves, in SI units; nothing is solved yet.
 
@@ -116,11 +116,25 @@ class Model:
         return bool(self.partial_slip or moves or self.side == "lower")
 
     @property
+    def moves(self) -> bool:
+        """Whether the model has a motion, prescribed or driven; otherwise its patch is only pressed."""
+        return self.slide is not None or self.rig is not None
+
+    @property
+    def area(self) -> PatchArea | None:
+        """Cells of the face of [contact]; None for a plane patch, and without [contact]."""
+        return None if self.patch is None else self.patch.area
+
+    @property
+    def patches(self) -> tuple[PatchModel, ...]:
+        """Patches that are pressed: that of [contact], or those of the interfaces of the rig."""
+        interfaces = () if self.rig is None else self.rig.friction.interfaces
+        return tuple(filter(None, (self.patch, *(interface.patch for interface in interfaces))))
+
+    @property
     def has_interface_patches(self) -> bool:
         """Whether at least one interface of the rig has a patch."""
-        if self.rig is None:
-            return False
-        return any(interface.patch is not None for interface in self.rig.friction.interfaces)
+        return self.patch is None and bool(self.patches)
 
     @property
     def bolted(self) -> BoltedJoint | None:

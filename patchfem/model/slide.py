@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import inputs
-from ..core import Missing
+from ..core import Missing, array_dataclass
 from ..friction import grooves
 from ..scene.rules.methods import find_climbed_grooves
 from .source import cache_by_file, name_key
@@ -53,7 +53,7 @@ class SlideSamples(NamedTuple):
     omega: float = 0.0
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class SlidePath:
     """Relative displacement that a bench prescribes over time.
 

@@ -151,7 +151,7 @@ def _list_open_loops(measures: Measures, window, drive) -> list[str]:
     _, stored, dissipated, created = np.abs(ledger[:, -1] - ledger[:, 0])
     areas = {name: one for name, one in measures.items() if name.startswith("loop_area")}
     if len(areas) == 1:
-        cycles = (window.time[-1] - window.time[0]) / drive.period
+        cycles = window.span / drive.period
         return list(areas) if stored > max(dissipated, loop.floor * cycles) else []
     if created > 1e-9 * (stored + dissipated):
         return []

@@ -167,13 +167,15 @@ class SolvedContact(NamedTuple):
 
 
 def search_layout(
-    patch_model, find_contacts: Callable[[CondensedPair], list[SolvedContact]]
+    patch_model,
+    find_contacts: Callable[[CondensedPair], list[SolvedContact]],
+    max_searches: int = MAX_CONTACT_SEARCHES,
 ) -> tuple[Layout, ContactExtent | None]:
     """Search for the contact regions of patches of equal geometry on grids that are graded towards the previous result.
 
     The contact is solved on a coarse grid, and the columns of the next grid are short at the edges of this
     contact. The search ends when the cells at all edges are short compared to the contact, after
-    MAX_CONTACT_SEARCHES solutions at most.
+    `max_searches` solutions at most.
 
     If a varying load moves the contact edges, the columns are short wherever the edges lie between
     VARYING_LOAD_FACTORS times the load. If wear moves them, no column is longer than
@@ -185,6 +187,8 @@ def search_layout(
         Pieces and mesh settings of all patches.
     find_contacts : callable
         Function of the pieces on a grid that returns the contacts for which the next grid is graded; [] without a load.
+    max_searches : int
+        Largest number of searches.
 
     Returns
     -------
@@ -195,7 +199,7 @@ def search_layout(
     """
     layout = make_search_layout(patch_model)
     contact = None
-    for _ in range(MAX_CONTACT_SEARCHES):
+    for _ in range(max_searches):
         pair = condense(patch_model, *make_grids(patch_model, layout), keep_factors=False)
         solved = find_contacts(pair)
 

@@ -642,9 +642,7 @@ def find_relative_error(motion: periodic.PeriodicMotion) -> float:
     return motion.error + STEPS_ERROR * RTOL
 
 
-def solve_steady_motion(
-    model, numerics, patch, frames: int = 0, say=None, progress=None
-) -> Solution:
+def solve_steady_motion(model, numerics, patch, frames: int = 0, say=None) -> Solution:
     """Compute the steady motion under a sine, or the largest one over a sweep.
 
     The drive of the largest motion is `Solution.drive`.
@@ -659,8 +657,8 @@ def solve_steady_motion(
         None under [normal] and between masses.
     frames : int
         Number of snapshots of the interface in a cycle.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction; progress is not used.
+    say : callable, optional
+        Callback for a line of text.
 
     Returns
     -------
