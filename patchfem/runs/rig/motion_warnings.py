@@ -40,7 +40,7 @@ SINGLE_POINT_WARNING = (
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
     "same load; add [contact.shear] to let the patch slip part by part"
 )
-BANDS_NOTE = f"the face yaws as {model_structure.N_YAW_BANDS} bands of cells, each with the displacement of its middle"
+BANDS_NOTE = "the face yaws as {} bands of cells, each with the displacement of its middle"
 NEGLECTED_YAW_NOTE = (
     "the yaw also moves the ends of the patch across x; this motion and its friction are neglected"
 )
@@ -274,7 +274,9 @@ MOTION_WARNINGS = (
 MOTION_NOTES = (
     lambda run: run.model.rig.structure.reduction_notes,
     *LAW_NOTES,
-    lambda run: [BANDS_NOTE] * run.model.rig.friction.bands_slide_apart,
+    lambda run: (
+        [BANDS_NOTE.format(model_structure.N_YAW_BANDS)] * run.model.rig.friction.bands_slide_apart
+    ),
     _note_on_elements_without_slip,
     _note_on_smallest_slip_of_onset,
     lambda run: note_on_creep(run.model.friction),
