@@ -13,10 +13,8 @@ from ...core import Response
 from ...motion_measures import energy_balance
 from ...response.loops import (
     choose_reversal_force_rule,
-    compute_interface_loop,
-    compute_mean_half_range,
-    compute_secant_stiffness,
     find_reversals,
+    measure_sampled_loop,
     sample_loop,
 )
 from ...response.measures import (
@@ -241,7 +239,5 @@ def _compute_loop_measures(
     # Without a mode there is no stiffness that damping could refer to, hence the 0.
     harmonic = compute_step_harmonic(time, means, omega)
     loop = sample_loop(time, slide, harmonic, omega, work[-1] - work[0])
-    measures = compute_interface_loop(compute_mean_half_range(reversals), *loop, 0.0)
-    measures["secant_stiffness"] = compute_secant_stiffness(reversals)
-    measures["drift_per_cycle"] = float(slide[-1] - slide[0])
-    return {name: value for name, value in measures.items() if value is not None}
+    measures = measure_sampled_loop(reversals, loop, 0.0)
+    return measures | {"drift_per_cycle": float(slide[-1] - slide[0])}
