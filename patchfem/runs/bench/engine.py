@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import friction
 from ...effects import law_has_trait, law_supports
-from ...model.slide import SlideSamples
+from ...model import slide as model_slide
 from ..interfaces import bond_lists
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
@@ -69,7 +69,9 @@ class Numerics:
         return replace(self, steps=2 * self.steps)
 
 
-def make_bench_numerics(model, steps: int, path: SlideSamples | None = None) -> Numerics:
+def make_bench_numerics(
+    model, steps: int, path: "model_slide.SlideSamples | None" = None
+) -> Numerics:
     """Return the Numerics of a bench.
 
     Parameters
@@ -135,7 +137,9 @@ def uses_parallel_elements(model) -> bool:
     return is_constant and is_known and law_supports(model.friction, "pieces")
 
 
-def sample_path(model, steps: int, path: SlideSamples | None = None) -> SlideSamples:
+def sample_path(
+    model, steps: int, path: "model_slide.SlideSamples | None" = None
+) -> "model_slide.SlideSamples":
     """Return the samples of a path, to which a varying load adds some, because it bends the force between them.
 
     Parameters
@@ -152,7 +156,7 @@ def sample_path(model, steps: int, path: SlideSamples | None = None) -> SlideSam
         start = time[first]
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
-    return SlideSamples(time, slide, first, omega)
+    return model_slide.SlideSamples(time, slide, first, omega)
 
 
 class BenchSizes(NamedTuple):

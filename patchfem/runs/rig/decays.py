@@ -275,11 +275,10 @@ def add_mesh_errors(
         return curve, (f"the errors of the decay curve include {lacks}, because {reason}",)
 
     # Linear interpolation over the logarithm of the amplitude
-    amplitudes = np.log(at[known])
-    frequency_error, damping_error = (
-        np.interp(np.log(curve.amplitude), np.log(at), np.interp(np.log(at), amplitudes, row))
-        for row in errors[:, known]
-    )
+    places = np.log(at)
+    own = np.log(curve.amplitude)
+    errors = [np.interp(places, places[known], row[known]) for row in errors]
+    frequency_error, damping_error = [np.interp(own, places, row) for row in errors]
     curve = curve._replace(
         frequency_error=np.fmax(curve.frequency_error, frequency_error),
         damping_error=np.fmax(curve.damping_error, damping_error),

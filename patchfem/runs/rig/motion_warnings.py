@@ -40,7 +40,6 @@ SINGLE_POINT_WARNING = (
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
     "same load; add [contact.shear] to let the patch slip part by part"
 )
-BANDS_NOTE = "the face yaws as {} bands of cells, each with the displacement of its middle"
 NEGLECTED_YAW_NOTE = (
     "the yaw also moves the ends of the patch across x; this motion and its friction are neglected"
 )
@@ -209,6 +208,12 @@ def _warn_of_overhang(run) -> Iterator[str]:
 # ---- notes on rigs
 
 
+def _note_on_bands(run) -> Iterator[str]:
+    """Note that the bands of a face yaw as wholes."""
+    if run.model.rig.friction.bands_slide_apart:
+        yield f"the face yaws as {model_structure.N_YAW_BANDS} bands of cells, each with the displacement of its middle"
+
+
 def _note_on_elements_without_slip(run) -> Iterator[str]:
     """Note that a steady motion is not unique if some elements of the joint never slip in it."""
     is_steady = run.solution.run.outcome in (Outcome.STEADY, Outcome.STUCK) and run.has_friction
@@ -274,9 +279,7 @@ MOTION_WARNINGS = (
 MOTION_NOTES = (
     lambda run: run.model.rig.structure.reduction_notes,
     *LAW_NOTES,
-    lambda run: (
-        [BANDS_NOTE.format(model_structure.N_YAW_BANDS)] * run.model.rig.friction.bands_slide_apart
-    ),
+    _note_on_bands,
     _note_on_elements_without_slip,
     _note_on_smallest_slip_of_onset,
     lambda run: note_on_creep(run.model.friction),

@@ -114,10 +114,8 @@ def compute_dimensionless_groups(model: Model) -> Values:
     rig = model.rig
     drive = rig.drive
     first_mode = rig.first_mode
-    limits = [
-        law.friction_limits(bond_lists.find_interface_load(model, law))
-        for law in rig.friction.interfaces
-    ]
+    laws = rig.friction.interfaces
+    limits = [law.friction_limits(bond_lists.find_interface_load(model, law)) for law in laws]
     static = sum(limit.static for limit in limits)
     kinetic = sum(limit.kinetic for limit in limits)
 
@@ -188,11 +186,8 @@ def describe_stick(rig, sizes: Values, chain: Chain) -> list[str]:
         return []
     stiffness = rig.first_mode.stiffness
     limit = MIN_HOLDING_LINK_STIFFNESS_RATIO * stiffness
-    compliant_links = [
-        name
-        for name, link in chain.items()
-        if not isinstance(link, str) and name != "mode" and link < limit
-    ]
+    links = {name: link for name, link in chain.items() if not isinstance(link, str)}
+    compliant_links = [name for name, link in links.items() if name != "mode" and link < limit]
     if ratio >= 1 and compliant_links:
         link = compliant_links[-1]
         return [

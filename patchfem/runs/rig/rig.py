@@ -571,11 +571,8 @@ def _find_peak_frequency(solution: Solution, coarser=()) -> Measures:
         return {}
     if np.isinf(steady.peak_error):
         return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK_REASON)}
-    peak, *others = [
-        float(one.steady.drive.omega / (2 * np.pi))
-        for one in (solution, *coarser)
-        if one.steady.drive is not None
-    ]
+    drives = [one.steady.drive for one in (solution, *coarser)]
+    peak, *others = [float(one.omega / (2 * np.pi)) for one in drives if one is not None]
     shift = float(np.abs(np.array(others) - peak).max(initial=0.0))
     error = steady.peak_error + convergence_error(shift)
     measures = {"peak_frequency": Measure(peak, "Hz", error, 0.0)}
