@@ -440,7 +440,8 @@ class MeasureDefinition(NamedTuple):
       "interface" (one value per interface), "level" (one value per drive level), "curve" (a column of a response
       curve), "mesh" (its error controls the mesh), "displacement" (its floor is limited by the displacement of the
       drive), "force" (its floor is limited by the normal load), "error" (it is itself an error), "sine" (it exists only
-      under a sine), "loop" (an integral or a peak of samples of the friction loop), "run" (a sum over the whole run),
+      under a sine), "cycle" (a mean over whole cycles of a sine),
+      "loop" (an integral or a peak of samples of the friction loop), "run" (a sum over the whole run),
       "phase" (an angle modulo pi), "scatter" (a statistical mean under a random drive).
     - friction_scale: name of the size in `response.errors.compute_friction_errors` that is the error of the measure for a
       relative error 1 of the friction force; "" if this is the value of the measure.

@@ -50,7 +50,17 @@ class ShapedGap(NamedTuple):
     seconds: dict[str, float]
 
     def add_profile(self, heights, notes: tuple[str, ...], seconds: float) -> "ShapedGap":
-        """Return the gap with the heights [m] of a profile, with notes on it and its computing time [s]."""
+        """Return the gap with the heights of a profile.
+
+        Parameters
+        ----------
+        heights : array
+            Heights [m] at the nodes.
+        notes : tuple of str
+            Sentences on the profile.
+        seconds : float
+            Its computing time [s].
+        """
         return ShapedGap(self.heights + heights, notes, self.seconds | {"profile": seconds})
 
 

@@ -137,14 +137,14 @@ class Model:
         return self.patch is None and bool(self.patches)
 
     @property
-    def bolted(self) -> BoltedJoint | None:
+    def bolted_joint(self) -> BoltedJoint | None:
         """Joint that was bolted when the modes were measured, or None."""
         return None if self.rig is None else self.rig.structure.bolted
 
     @property
     def has_bolted_patch(self) -> bool:
         """Whether the patch of a joint is still to be solved, for modes that were measured with it."""
-        return self.bolted is not None and self.bolted.build_rig is not None
+        return self.bolted_joint is not None and self.bolted_joint.build_rig is not None
 
     def with_bolted(self, bolted: BoltedJoint) -> Model:
         """Return the model with another joint that was bolted when its modes were measured."""
@@ -153,7 +153,7 @@ class Model:
 
     def describe_removed_joint(self) -> list[str]:
         """Return a list with a sentence on the joint that was subtracted from the modes, or []."""
-        bolted = self.bolted
+        bolted = self.bolted_joint
         if bolted is None or bolted.subtracted is None:
             return []
         texts = [format_quantity(k, "N m-1", 4) for k in bolted.subtracted.stiffness]
@@ -168,7 +168,7 @@ class Model:
         So the resolved scene and the command that repeats a run subtract the same joint again. If each case has its own
         modal test, nothing is stated, because the scene then means its own joint.
         """
-        bolted = self.bolted
+        bolted = self.bolted_joint
         if bolted is None or bolted.origin == "case" or bolted.subtracted is None:
             return self
         writer = self.source.writer._replace(joint=bolted.subtracted.list_values())

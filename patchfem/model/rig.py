@@ -289,9 +289,7 @@ class Rig:
 
     def with_law(self, law: "Friction") -> "Rig":
         """Return a copy of the rig whose interfaces have another friction law."""
-        interfaces = tuple(
-            replace(interface, numbers=law) for interface in self.friction.interfaces
-        )
+        interfaces = tuple(replace(one, numbers=law) for one in self.friction.interfaces)
         return replace(self, friction=replace(self.friction, interfaces=interfaces))
 
     def with_signal(self, signal, **changes) -> "Rig":

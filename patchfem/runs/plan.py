@@ -158,14 +158,14 @@ def _make_plan(model: Model) -> Plan:
     # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
     values: Values = {}
     if model.has_bolted_patch:
-        before = model.bolted
+        before = model.bolted_joint
         model, patches, _ = joint.solve_without_joint(model)
         values = {name: measure.value for name, measure in patches[0].measures.items()}
     sentences = model.describe_removed_joint()
     if values:
         # A run has these modes of the structure alone, but subtracts the joint of its own meshes from the measured ones.
         model = model.with_bolted(
-            model.bolted._replace(build_rig=before.build_rig, subtracted=before.subtracted)
+            model.bolted_joint._replace(build_rig=before.build_rig, subtracted=before.subtracted)
         )
     rig = model.rig
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ... import response
 from ...core import (
+    Measure,
     Outcome,
     Response,
     add_interface_number,
@@ -171,12 +172,14 @@ class SteadyData(NamedTuple):
     - multipliers (m,): Floquet multipliers.
     - residual: change over a period relative to the motion; NaN if unknown.
     - curve: columns of the response curve by name (`steady.curves.tabulate_curve`); None for a single frequency.
+    - width: half-power width of the curve; None for a single frequency, or if the curve is not drawn.
     """
 
     regime: str
     multipliers: np.ndarray
     residual: float = np.nan
     curve: Arrays | None = None
+    width: Measure | None = None
 
 
 class MotionData(NamedTuple):

@@ -561,9 +561,10 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
 
 
 def _find_peak_frequency(solution: Solution, coarser=()) -> Measures:
-    """Return a dict with the frequency [Hz] of the peak of a response curve and its error; {} without a curve.
+    """Return a dict with the frequency and the half-power width [Hz] of the peak of a response curve; {} without a curve.
 
-    The measure has no value if the amplitude is 0. The shift of the peaks of `coarser` runs is part of the error.
+    The frequency has no value if the amplitude is 0, and a curve that is not drawn has no width. The shift of the peaks of
+    `coarser` runs is part of the error.
     """
     steady = solution.steady
     if steady is None or np.isnan(steady.peak_error):
@@ -577,7 +578,9 @@ def _find_peak_frequency(solution: Solution, coarser=()) -> Measures:
     ]
     shift = float(np.abs(np.array(others) - peak).max(initial=0.0))
     error = steady.peak_error + convergence_error(shift)
-    return {"peak_frequency": Measure(peak, "Hz", error, 0.0)}
+    measures = {"peak_frequency": Measure(peak, "Hz", error, 0.0)}
+    width = steady.data.width
+    return measures if width is None else measures | {"peak_width": width}
 
 
 # ---- completion
