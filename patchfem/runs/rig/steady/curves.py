@@ -18,7 +18,8 @@ from ....response.errors import compute_absolute_changes
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE
 from ...results.patch_rows import Arrays
-from ..evaluation import EXACT_RELATIVE_ERROR, Solution, replace_output_by_gauge
+from ..evaluation import Solution, replace_output_by_gauge
+from ..levels import EXACT_RELATIVE_ERROR
 
 # An error is relative to the value, but at least to this fraction of the largest value of the curve, which may start at 0.
 MIN_VALUE_RATIO = 1e-3
@@ -604,20 +605,20 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     points, best, above = peak[:3]
     peak_point = points[best]
     solution = finder.compute_steady_motion(peak_point.drive, peak_point.guess)
-    errors = dict(solution.errors or {})
     columns = tabulate_curve(points, curve.folds)
-    solution = replace(
-        solution,
-        notes=(*solution.notes, *curve.notes),
-        periodic=solution.periodic._replace(
-            curve=columns, width=measure_half_power_width(columns) if finder.draws_curve else None
-        ),
-        drive=peak_point.drive,
-    )
+    width = measure_half_power_width(columns) if finder.draws_curve else None
     height = peak_point.values.get(AMPLITUDE, 0.0)
+    steady = replace(
+        solution.steady,
+        data=solution.steady.data._replace(curve=columns, width=width),
+        notes=(*solution.steady.notes, *curve.notes),
+        drive=peak_point.drive,
+        peak_error=np.inf if height == 0 else 0.0,
+    )
+    errors = steady.errors
     y = _collect_amplitudes(points)
     if not height > 0 or AMPLITUDE not in solution.values:
-        return replace(solution, peak_error=np.inf if height == 0 else 0.0)
+        return replace(solution, steady=steady)
     # The curve point was computed with fewer samples, which adds this error.
     missed = abs(replace_output_by_gauge(finder.model, solution).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
@@ -647,4 +648,5 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
 
     position_errors[AMPLITUDE] = min(above, solution.values[AMPLITUDE]) + missed
     errors = {name: error + position_errors.get(name, 0.0) for name, error in errors.items()}
-    return replace(solution, errors=errors, peak_error=float(max_position_error))
+    steady = replace(steady, errors=errors, peak_error=float(max_position_error))
+    return replace(solution, steady=steady)

@@ -28,9 +28,9 @@ from ....response.measures import Values
 from ....response.rows import AMPLITUDE, select_names
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
-from ...results.result import Settings, SteadyData
+from ...results.result import SteadyData
 from ..engines import enlarge_hybrid_steps, estimate_hybrid_errors, may_fold
-from ..evaluation import Solution
+from ..evaluation import Solution, SteadyPart
 from ..event_to_event import LumpedEvaluator
 from ..joints import make_joints
 from .curves import (
@@ -187,8 +187,8 @@ class ShootingFinder:
         if run is not None:
             solution = self.evaluator.make_solution(run, process_time() - begin, drive)
             errors = {name: RTOL * abs(value) for name, value in solution.values.items()}
-            periodic_data = SteadyData("leaves its grooves", np.zeros(0))
-            return replace(solution, errors=errors, periodic=periodic_data)
+            data = SteadyData("leaves its grooves", np.zeros(0))
+            return replace(solution, steady=SteadyPart(data, errors))
 
         # The periodic motion is run once more from its state, for histories and frames.
         motion, notes = self._find_stable_motion(drive, guess)
@@ -197,39 +197,44 @@ class ShootingFinder:
         run = self.evaluator.resume(drive, cycles, state, self.frames)
         is_stuck = self.evaluator.is_stuck(run)
         solution = self.evaluator.make_solution(run, process_time() - begin, drive)
+        values = dict(solution.values)
+
+        # The errors are those of the steps, which a run with larger ones shows, and of the fixed point.
+        coarse = LumpedEvaluator(
+            self.model, enlarge_hybrid_steps(self.numerics), self.patch, self.joints
+        )
+        coarse_run = coarse.resume(drive, run.cycles_done, state, 0)
+        coarse_values = coarse.evaluate_measures(coarse_run, drive)
+        step_errors = estimate_hybrid_errors(values, coarse_values, RTOL)
+        relative = find_relative_error(motion)
+        errors = {}
+        for name, value in values.items():
+            errors[name] = step_errors.get(name, RTOL * abs(value)) + relative * abs(value)
 
         # A periodic motion does not drift. Friction works what it dissipates, which is nothing where no element slips.
-        values = solution.values
-        errors = self._estimate_errors(values, motion, run, drive, is_stuck=is_stuck)
-        known = {"drift_per_cycle": 0.0}
-        errors["drift_per_cycle"] = 0.0
         dissipated = values.get("energy_dissipated")
+        values["drift_per_cycle"] = errors["drift_per_cycle"] = 0.0
         if is_stuck and dissipated is not None:
-            known |= {"friction_work": dissipated, "loop_area": dissipated / run.cycles_done}
+            values |= {"friction_work": dissipated, "loop_area": dissipated / run.cycles_done}
             if not dissipated:
                 errors |= dict.fromkeys(("friction_work", "energy_dissipated", "loop_area"), 0.0)
 
         # An unstable motion is no result, because a rig would not stay in it.
         regime = self._name_regime(motion, is_stuck=is_stuck)
-        is_stable = is_stuck or motion.grows or motion.is_stable
-        outcome = Outcome.STUCK if is_stuck else solution.outcome or Outcome.STEADY
+        message = run.message
+        outcome = Outcome.STUCK if is_stuck else run.outcome or Outcome.STEADY
         if motion.grows:
             outcome = Outcome.GROWS
         elif float(np.abs(run.extremes).max()) > self.model.rig.springs.travel:
             outcome = Outcome.EXCEEDS_TRAVEL
-        if not is_stable:
+        if not (is_stuck or motion.grows or motion.is_stable):
             outcome = Outcome.NOT_CONVERGED
             regime = f"{regime}, unstable"
-        return replace(
-            solution,
-            values=values | known,
-            outcome=outcome,
-            message=solution.message if is_stable else describe_instability(motion.multipliers),
-            errors=errors,
-            notes=(*solution.notes, *notes),
-            settings=Settings(map="shooting"),
-            periodic=SteadyData(regime, motion.multipliers, motion.change),
-        )
+            message = describe_instability(motion.multipliers)
+        data = SteadyData(regime, motion.multipliers, motion.change)
+        run = replace(run, outcome=outcome, message=message)
+        steady = SteadyPart(data, errors, notes)
+        return replace(solution, values=values, run=run, steady=steady)
 
     def compute_point_values(self, point: CurvePoint) -> Values:
         """Return the measures of the steady motion at a curve point by name; {} if there is none."""
@@ -320,34 +325,6 @@ class ShootingFinder:
         path = equations.follow((0.0, MAX_LEVEL_RATIO * level), LEVEL_PATH)
         motions = [point.motion for point in equations.list_crossings(path, level)]
         return sorted(motions, key=lambda motion: motion.run.values[AMPLITUDE])
-
-    def _estimate_errors(self, values: Values, motion, run, drive, *, is_stuck: bool) -> Values:
-        """Return the errors of the measures of a periodic motion: those of the steps and of the fixed point.
-
-        Parameters
-        ----------
-        values : dict
-            Values of the measures by name.
-        motion
-            Periodic motion that was found, with its fixed point.
-        run : EngineRun
-            Run from which the values follow.
-        drive
-            Drive of the run.
-        is_stuck : bool
-            Whether the interface sticks all the time.
-        """
-        coarse = enlarge_hybrid_steps(self.numerics)
-        other = LumpedEvaluator(self.model, coarse, self.patch, self.joints)
-        start = None if motion.grows else motion.run.final
-        other_run = other.resume(drive, run.cycles_done, start, 0)
-        coarse_values = other.evaluate_measures(other_run, drive, stuck=is_stuck)
-        step_errors = estimate_hybrid_errors(values, coarse_values, RTOL)
-        relative = find_relative_error(motion)
-        errors = {}
-        for name, value in values.items():
-            errors[name] = step_errors.get(name, RTOL * abs(value)) + relative * abs(value)
-        return errors
 
     def _leave_grooves(self, drive):
         """Return the run from rest in which the lifted mass leaves the grooves, or None if it stays in them."""
@@ -687,9 +664,7 @@ def find_relative_error(motion: periodic.PeriodicMotion) -> float:
     return motion.error + STEPS_ERROR * RTOL
 
 
-def solve_steady_motion(
-    model, numerics, patch, frames: int = 0, say=None, progress=None
-) -> Solution:
+def solve_steady_motion(model, numerics, patch, frames: int = 0, say=None) -> Solution:
     """Compute the steady motion under a sine, or the largest one over a sweep.
 
     The drive of the largest motion is `Solution.drive`.
@@ -704,8 +679,8 @@ def solve_steady_motion(
         None under [normal] and between masses.
     frames : int
         Number of snapshots of the interface in a cycle.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction; progress is not used.
+    say : callable, optional
+        Callback for a line of text.
 
     Returns
     -------
