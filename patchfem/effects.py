@@ -24,7 +24,7 @@ Traits of laws:
 - `creeps`: the interface never sticks;
 - `cells`: a continuous distribution of elements is discretised into cells.
 
-`runs.rig.joints` and `time_steps.laws` have their own lists of supported laws.
+`hybrid.laws` and `time_steps.laws` have their own lists of supported laws.
 
 A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
 `DRIVE_BUILDERS` of its module; the class `Waveform` describes its traits.

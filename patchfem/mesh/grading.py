@@ -18,23 +18,20 @@ class Layout:
 
     - ``bands``: (from, to, length) [m] each. A cell has this length within the band and grows by
       `slope` per distance from it.
-    - ``span``: (from, to) [m] that is loaded
-    - ``max_loaded_length``, ``max_length``: maximum cell lengths [m] within the span and far from it
+    - ``max_length``: maximum cell length [m], far from all bands
     """
 
     start: float
     stop: float
     bands: tuple[tuple[float, float, float], ...]
-    span: tuple[float, float]
-    max_loaded_length: float
     max_length: float
     slope: float
 
     def cell_lengths(self, x) -> np.ndarray:
         """Return the target cell lengths (k,) [m] at positions x (k,) [m].
 
-        Each is the smallest of the lengths that the bands, the loaded span and the limit allow there. Outside a band
-        or span its length grows with the distance, by `slope` per unit.
+        Each is the smallest of the lengths that the bands and the limit allow there. Outside a band its length grows
+        with the distance, by `slope` per unit.
         """
         x = np.asarray(x, float)
         out = np.full(x.shape, self.max_length)
@@ -44,16 +41,13 @@ class Layout:
             lengths *= self.slope
             lengths += length
             np.minimum(out, lengths, out=out)
-        return np.minimum(
-            out, self.max_loaded_length + self.slope * _distance_from_interval(x, *self.span)
-        )
+        return out
 
     def scale_cells(self, factor: float) -> "Layout":
         """Return the layout after all cell lengths, and their slope, are multiplied by a factor."""
         return replace(
             self,
             bands=tuple((low, high, length * factor) for low, high, length in self.bands),
-            max_loaded_length=self.max_loaded_length * factor,
             max_length=self.max_length * factor,
             slope=self.slope * factor,
         )
@@ -184,7 +178,7 @@ def divide_into_rows(
     bands = ((0.0, 0.0, rows.first), (height, height, rows.last))
     if coating_thickness:
         bands += ((coating_thickness, coating_thickness, rows.coating),)
-    layout = Layout(0.0, height, bands, (0.0, height), rows.largest, rows.largest, rows.growth)
+    layout = Layout(0.0, height, bands, rows.largest, rows.growth)
     depths = divide_interval(replace(layout, start=coating_thickness), min_cells=3)
     if not coating_thickness:
         return frozen_array(depths), 0

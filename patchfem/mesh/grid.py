@@ -210,7 +210,7 @@ class TensorGrid:
             if stop > start + 1e-12 * self.x[-1]:
                 # Between lines at equal steps of the integral of 1/length, the first column has the length `cell`
                 bands = ((start, start, cell * slope / (growth - 1)),)
-                layout = Layout(start, stop, bands, (start, stop), np.inf, np.inf, slope)
+                layout = Layout(start, stop, bands, np.inf, slope)
                 outer = np.append(outer, divide_interval(layout)[1:])
                 cell = (outer[-1] - outer[-2]) * growth
         return replace(self, outer=frozen_array(outer), end=end)

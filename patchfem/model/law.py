@@ -6,11 +6,11 @@ stiffness of the law.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from .. import friction
-from ..core import PatchfemError
+from ..core import PatchfemError, array_dataclass
 from ..effects import import_effect
 from . import patch as patch_models
 from .source import name_key
@@ -31,7 +31,7 @@ class FrictionLimits(NamedTuple):
     kinetic: float
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class InterfaceLaw:
     """Interface of a rig with its friction law.
 

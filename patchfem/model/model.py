@@ -5,14 +5,14 @@ No module after this folder knows a Scene.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
 from math import prod
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..core import PatchfemError
+from ..core import PatchfemError, array_dataclass
 from ..effects import law_has_trait, list_absent_effects, needs_bond_list
 from ..formatting import format_quantity
 from ..scene.keys.memoize import memoize
@@ -27,7 +27,7 @@ from .source import SceneWriter, Source, locate_errors
 if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
     from ..friction.grooves import Grooves
-    from .patch import PatchModel
+    from .patch import PatchArea, PatchModel
     from .rig import BoltedJoint, Rig
     from .slide import PointLoad, SlidePath
     from .wear import WearModel
@@ -52,7 +52,7 @@ class MeasuredFile(NamedTuple):
     cutoff: float | None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Model:
     """Problem that a run solves, in SI units; nothing is solved yet.
 
@@ -116,21 +116,35 @@ class Model:
         return bool(self.partial_slip or moves or self.side == "lower")
 
     @property
-    def has_interface_patches(self) -> bool:
-        """Whether at least one interface of the rig has a patch."""
-        if self.rig is None:
-            return False
-        return any(interface.patch is not None for interface in self.rig.friction.interfaces)
+    def moves(self) -> bool:
+        """Whether the model has a motion, prescribed or driven; otherwise its patch is only pressed."""
+        return self.slide is not None or self.rig is not None
 
     @property
-    def bolted(self) -> BoltedJoint | None:
+    def area(self) -> PatchArea | None:
+        """Cells of the face of [contact]; None for a plane patch, and without [contact]."""
+        return None if self.patch is None else self.patch.area
+
+    @property
+    def patches(self) -> tuple[PatchModel, ...]:
+        """Patches that are pressed: that of [contact], or those of the interfaces of the rig."""
+        interfaces = () if self.rig is None else self.rig.friction.interfaces
+        return tuple(filter(None, (self.patch, *(interface.patch for interface in interfaces))))
+
+    @property
+    def has_interface_patches(self) -> bool:
+        """Whether at least one interface of the rig has a patch."""
+        return self.patch is None and bool(self.patches)
+
+    @property
+    def bolted_joint(self) -> BoltedJoint | None:
         """Joint that was bolted when the modes were measured, or None."""
         return None if self.rig is None else self.rig.structure.bolted
 
     @property
     def has_bolted_patch(self) -> bool:
         """Whether the patch of a joint is still to be solved, for modes that were measured with it."""
-        return self.bolted is not None and self.bolted.build_rig is not None
+        return self.bolted_joint is not None and self.bolted_joint.build_rig is not None
 
     def with_bolted(self, bolted: BoltedJoint) -> Model:
         """Return the model with another joint that was bolted when its modes were measured."""
@@ -139,7 +153,7 @@ class Model:
 
     def describe_removed_joint(self) -> list[str]:
         """Return a list with a sentence on the joint that was subtracted from the modes, or []."""
-        bolted = self.bolted
+        bolted = self.bolted_joint
         if bolted is None or bolted.subtracted is None:
             return []
         texts = [format_quantity(k, "N m-1", 4) for k in bolted.subtracted.stiffness]
@@ -154,7 +168,7 @@ class Model:
         So the resolved scene and the command that repeats a run subtract the same joint again. If each case has its own
         modal test, nothing is stated, because the scene then means its own joint.
         """
-        bolted = self.bolted
+        bolted = self.bolted_joint
         if bolted is None or bolted.origin == "case" or bolted.subtracted is None:
             return self
         writer = self.source.writer._replace(joint=bolted.subtracted.list_values())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .. import inputs
-from ..core import InitialState, ModalBasis
+from ..core import InitialState, ModalBasis, array_dataclass, max_abs
 from ..effects import Waveform, find_waveform, import_effect
 from ..scene.rules.methods import find_load_change_key
 from ..structure import drives
@@ -41,8 +41,8 @@ from .structure import (
 )
 
 if TYPE_CHECKING:
+    from ..scene.keys.tables import Friction
     from ..structure.drives import DriveSignal
-    from .model import Model
 
 # Largest displacement [m] up to which a motion that grows without bound is computed.
 MAX_COMPUTED_DISPLACEMENT = 1e3
@@ -72,7 +72,7 @@ class DriveLevels:
     onset: tuple[str, float | None] = ("distortion", None)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class RigDrive:
     """Drive signal of a rig, with its kind, frequency and number of cycles.
 
@@ -94,7 +94,7 @@ class RigDrive:
     levels: DriveLevels = DriveLevels()
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class RigFriction:
     """Friction interfaces of a rig.
 
@@ -137,7 +137,7 @@ class RigSprings:
         return self.cubic is not None or self.interlock is not None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class FirstMode:
     """First elastic mode of the scene, for the rig without the spring of the bonded joint.
 
@@ -193,7 +193,7 @@ class BoltedJoint(NamedTuple):
       whose stiffness in stick is computed.
     - build_stiffer_rig: the same for a joint that is stiffer by the error of its stiffness, if this stiffness determines
       the slide of the modes, or None.
-    - model: Model of the scene with this joint, or None if it is the model of the rig itself.
+    - model: `model.Model` of the scene with this joint, or None if it is the model of the rig itself.
     - stuck_stiffness: stiffness [N/m] of the solved patch of the rig in full stick, or None without one.
     """
 
@@ -202,11 +202,11 @@ class BoltedJoint(NamedTuple):
     subtracted: SubtractedJoint | None = None
     build_rig: "Callable[[SubtractedJoint], Rig] | None" = None
     build_stiffer_rig: "Callable[[SubtractedJoint], Rig] | None" = None
-    model: "Model | None" = None
+    model: object = None
     stuck_stiffness: float | None = None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class RigStructure:
     """Structure of a rig: its natural frequencies, and where its modes come from.
 
@@ -234,7 +234,7 @@ class RigStructure:
         return self.other_rigs[0] if self.other_rigs else None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Rig:
     """Modes of a structure with the drive signal, the interfaces and the springs.
 
@@ -286,6 +286,11 @@ class Rig:
         """
         frequency = load.frequency if load is not None and load.amplitude else None
         return count_repeat_cycles(self.drive.signal, frequency)
+
+    def with_law(self, law: "Friction") -> "Rig":
+        """Return a copy of the rig whose interfaces have another friction law."""
+        interfaces = tuple(replace(one, numbers=law) for one in self.friction.interfaces)
+        return replace(self, friction=replace(self.friction, interfaces=interfaces))
 
     def with_signal(self, signal, **changes) -> "Rig":
         """Return a copy of the rig with another drive signal; `changes` replace other fields of the drive."""
@@ -492,7 +497,7 @@ def _build_first_mode(scene, unbonded: ModalBasis, modes: ModalBasis) -> FirstMo
         moves_output = squared[first] > MIN_MODE_OUTPUT_FRACTION * total
         mass = float(unbonded.mass / (squared[first] if moves_output else total))
     contact_mass = 0.0
-    if abs(slide[first]) > MIN_MODE_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
+    if abs(slide[first]) > MIN_MODE_SLIDE_FRACTION * max_abs(slide):
         contact_mass = float(unbonded.mass / max(slide[first] ** 2, 1e-300))
 
     # Both bases describe the same masses, so a least-squares fit converts the coordinates.

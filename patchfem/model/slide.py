@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import inputs
-from ..core import Missing
+from ..core import Missing, array_dataclass
 from ..friction import grooves
 from ..scene.rules.methods import find_climbed_grooves
 from .source import cache_by_file, name_key
@@ -29,7 +29,6 @@ MAX_BOND_LENGTHS = 1000
 MIN_STEPS_PER_CYCLE = 100
 MAX_BENCH_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
 MAX_PATH_SAMPLES = 20_000_000  # largest number of samples in a path; more take too much memory
-STEP_COUNT_TOL = 1e-12  # relative round-off of a number of steps that is exactly an integer
 MAX_SLIDE_SAMPLES = 5_000_000  # largest number of samples in a slide; more take too much memory
 # Fraction of the largest load below which a load is round-off of zero, so that the contact is lost.
 MIN_LOAD_FRACTION = 1e-12
@@ -53,7 +52,7 @@ class SlideSamples(NamedTuple):
     omega: float = 0.0
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class SlidePath:
     """Relative displacement that a bench prescribes over time.
 
@@ -249,7 +248,8 @@ def _sample_legs(time, rel_disp, steps: int) -> SlideSamples:
     """
     length = np.abs(np.diff(rel_disp))
     fraction = length / length.sum() / 2 + 1 / (2 * np.count_nonzero(length))
-    moving_steps = np.maximum(1, np.ceil(steps * fraction * (1 - STEP_COUNT_TOL)))
+    # A number of steps that is exactly an integer has a relative round-off below 1e-12.
+    moving_steps = np.maximum(1, np.ceil(steps * fraction * (1 - 1e-12)))
     leg_steps = np.where(length > 0, moving_steps, STEPS_PER_HOLD).astype(int)
     corner_index = np.concatenate([[0], np.cumsum(leg_steps)])
     index = np.arange(corner_index[-1] + 1)

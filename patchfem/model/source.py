@@ -2,12 +2,11 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache, wraps
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from ..core import NotConverged, PatchfemError
+from ..core import NotConverged, PatchfemError, array_dataclass
 from ..scene.lines import locate_key, number_items_from_one
 from ..scene.sets import format_values
 
@@ -29,7 +28,7 @@ class SceneWriter(NamedTuple):
     joint: dict[str, float]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Source:
     """Scene file or text from which a model was built.
 

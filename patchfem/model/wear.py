@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import PatchfemError
+from ..core import PatchfemError, array_dataclass, max_abs
 from ..formatting import format_length
 from ..scene.keys.tables import Friction, Tables
 from ..scene.scene import Scene
@@ -38,13 +38,11 @@ SURFACE_KEYS = (
 # Largest difference between the gaps of one patch on two meshes, relative to the range of the gap.
 GAP_DIFFERENCE_FRACTION = 1e-2
 MIN_GAP_DIFFERENCE = 1e-12  # difference between gaps [m] below which it is round-off
-# Largest relative difference between the lengths of one interface on two meshes.
-MAX_LENGTH_DIFFERENCE = 1e-6
 # Exceptions of h5py, json and tomllib for a file of another kind.
 FOREIGN_ERRORS = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class EarlierWear:
     """State at the end of an earlier run with wear.
 
@@ -76,7 +74,6 @@ class EarlierWear:
 
     def depth_at(self, axes) -> np.ndarray:
         """Interpolate the worn depth to the nodes (m,) [m] of other axes on the same interface."""
-        self._require_same_length(axes)
         return np.maximum(interpolate_nodes(self.axes, self.depth, axes), 0.0)
 
     def require_same_surfaces(self, axes, gap) -> None:
@@ -84,10 +81,9 @@ class EarlierWear:
 
         A plane may be added to the gap, because the pieces may be tilted.
         """
-        self._require_same_length(axes)
         change = interpolate_nodes(self.axes, self.gap, axes) - gap
         plane = np.column_stack([np.ones(gap.size), _list_places(axes)])
-        change = float(np.abs(change - plane @ np.linalg.lstsq(plane, change)[0]).max())
+        change = max_abs(change - plane @ np.linalg.lstsq(plane, change)[0])
         if change > GAP_DIFFERENCE_FRACTION * float(np.ptp(gap)) + MIN_GAP_DIFFERENCE:
             raise PatchfemError(
                 f"{self.path}: the unworn surfaces of that run differ from those of this scene by "
@@ -106,19 +102,6 @@ class EarlierWear:
         if measure["error"] is None:
             return None
         return measure["error"] + abs(measure["value"] - value)
-
-    def _require_same_length(self, axes) -> None:
-        """Raise PatchfemError unless the interface of the earlier run is as long as that of other axes [m]."""
-        before = self.axes[0]
-        x = axes[0]
-        # The keys tell the size of a face, whose cells have their places in the middle.
-        if len(axes) > 1 or np.allclose(before[[0, -1]], x[[0, -1]], MAX_LENGTH_DIFFERENCE, 0):
-            return
-        raise PatchfemError(
-            f"{self.path}: the interface of that run is {format_length(float(np.ptp(before)))} long, but "
-            f"that of this scene {format_length(x[-1] - x[0])}; choose a run of the same pieces",
-            WEAR_START_KEY,
-        )
 
 
 def interpolate_nodes(axes, values, others) -> np.ndarray:

@@ -22,12 +22,9 @@ from ..core import (
 from ..motion_measures import MAX_RESTING_SLIDE_RANGE, energy_balance, ratio_or_zero
 from . import stationary
 from .loops import (
-    Reversal,
-    compute_interface_loop,
     compute_mean_drift,
-    compute_mean_half_range,
-    compute_secant_stiffness,
     find_reversals,
+    measure_sampled_loop,
 )
 from .measures import (
     Measures,
@@ -81,7 +78,7 @@ class LastCycles:
     @cached_property
     def span(self) -> float:
         """Duration of the window [s]."""
-        return self.window.time[-1] - self.window.time[0]
+        return self.window.span
 
     @cached_property
     def slip_measures(self) -> Values:
@@ -93,8 +90,8 @@ class LastCycles:
         return compute_slip_measures(window, self.drive, steps)
 
     @cached_property
-    def reversals(self) -> list[tuple[Reversal, ...]]:
-        """Reversal at the smallest and at the largest displacement in each complete cycle."""
+    def reversals(self) -> np.ndarray:
+        """Smallest and largest slide [m], each with the force there [N], in each complete cycle (c, 4)."""
         w = self.window
         return find_reversals(
             w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.reversal_rule
@@ -112,10 +109,8 @@ class LastCycles:
         is_moving = self.is_sine and np.ptp(self.window.slide) > max(
             2 * self.slide_round_off, MAX_RESTING_SLIDE_RANGE
         )
-        reversals = self.reversals if is_moving else []
-        half_range = compute_mean_half_range(reversals)
-        measures = compute_interface_loop(half_range, *self.loop, self.stiffness)
-        return measures | {"secant_stiffness": compute_secant_stiffness(reversals)}
+        reversals = self.reversals if is_moving else np.empty((0, 4))
+        return measure_sampled_loop(reversals, self.loop, self.stiffness)
 
     @cached_property
     def acceleration_measures(self) -> Values:

@@ -128,7 +128,7 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
 
     # The bolted modes may belong to another contact than the one of this run: `written` is the one
     # of the measurement, unless the scene states what is subtracted.
-    bolted = model.bolted
+    bolted = model.bolted_joint
     written = bolted.model or model
     with locate_errors(model.source):
         own = _find_stick_stiffness(model, patches)

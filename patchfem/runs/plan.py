@@ -8,19 +8,19 @@ the memory of the run (`list_memory_parts`), and refuses a run that needs more t
 import mmap
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from .. import friction, inputs, structure
-from ..core import Missing, add_interface_number
+from ..core import Missing, add_interface_number, array_dataclass
 from ..effects import EFFECTS, law_has_trait
 from ..model.model import Model, build
 from ..model.source import locate_errors, name_key
 from ..scene import refuse_attribute
 from . import joint, refine
 from .bench import engine as of_bench
+from .interfaces import bond_lists
 from .patch import plan as patch_plan
 from .results.patch_rows import Values
 from .rig import engines
@@ -54,7 +54,7 @@ DIMENSIONLESS_GROUPS = {  # definition and SI unit of each group by its name
 }
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Plan:
     """Model with the engine that will run it and the numbers of its unknowns.
 
@@ -158,14 +158,14 @@ def _make_plan(model: Model) -> Plan:
     # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
     values: Values = {}
     if model.has_bolted_patch:
-        before = model.bolted
+        before = model.bolted_joint
         model, patches, _ = joint.solve_without_joint(model)
         values = {name: measure.value for name, measure in patches[0].measures.items()}
     sentences = model.describe_removed_joint()
     if values:
         # A run has these modes of the structure alone, but subtracts the joint of its own meshes from the measured ones.
         model = model.with_bolted(
-            model.bolted._replace(build_rig=before.build_rig, subtracted=before.subtracted)
+            model.bolted_joint._replace(build_rig=before.build_rig, subtracted=before.subtracted)
         )
     rig = model.rig
 
@@ -176,7 +176,7 @@ def _make_plan(model: Model) -> Plan:
     engine = "static"
     samples = 0
     patch_sentences = []
-    if model.patch is not None or model.has_interface_patches:
+    if model.patches:
         unknowns = patch_plan.count_unknowns(model)
     if rig is not None:
         engine = engines.choose_engine(model).name
@@ -184,7 +184,7 @@ def _make_plan(model: Model) -> Plan:
         groups = of_rig.compute_dimensionless_groups(model) if model.kind == "rig" else {}
         unknowns |= of_rig.count_unknowns(model)
         sentences += engines.describe_unused_settings(model, engine)
-    elif model.kind == "bench":
+    elif model.moves:
         engine, counts, samples = of_bench.count_bench_sizes(model)
         unknowns |= counts
         groups = of_bench.compute_dimensionless_groups(model)
@@ -228,7 +228,7 @@ def _find_law_stiffnesses(model: Model) -> "of_rig.Chain":
     loads = [(model.friction, model.nominal_load)]
     if model.rig is not None:
         for interface in model.rig.friction.interfaces[1:]:
-            loads.append((interface.numbers, of_rig.find_interface_load(model, interface)))
+            loads.append((interface.numbers, bond_lists.find_interface_load(model, interface)))
     stiffnesses = {}
     if model.grooves is not None:
         stiffnesses["grooves"] = model.grooves.stiffness(model.nominal_load)
@@ -308,13 +308,10 @@ def list_memory_parts(plan: Plan) -> list[MemoryPart]:
     points = plan.unknowns.get("interface_points", 0)
     nodes = plan.unknowns.get("elastic_unknowns_about", 0) / 2
 
-    # Pressed are the contact of the scene, and the interfaces of a rig.
-    interfaces = () if model.rig is None else model.rig.friction.interfaces
-    patches = [model.patch, *(interface.patch for interface in interfaces)]
     remedy = "make contact.element_size larger"
-    if any(patch is not None and patch.mesh.file for patch in patches):
+    if any(patch.mesh.file for patch in model.patches):
         remedy = "give contact.mesh fewer nodes on the interface"
-    size = nodes * (BYTES_PER_STATIC_NODE if model.kind == "patch" else BYTES_PER_MOVING_NODE)
+    size = nodes * (BYTES_PER_MOVING_NODE if model.moves else BYTES_PER_STATIC_NODE)
     parts = [
         MemoryPart(refine.PROGRAM_BYTES, "packages and compiled code"),
         MemoryPart(size, f"{points} nodes of the interface", remedy),

@@ -26,9 +26,7 @@ def test_always_column_widths_follow_layout(position, min_size, slope, span):
     layout = Layout(
         -0.5,
         0.5,
-        ((position, position, min_size),),
-        (low, position),
-        max(min_size, 0.05),
+        ((position, position, min_size), (low, position, max(min_size, 0.05))),
         0.1,
         slope,
     )

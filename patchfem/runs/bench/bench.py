@@ -13,10 +13,8 @@ from ...core import Response
 from ...motion_measures import energy_balance
 from ...response.loops import (
     choose_reversal_force_rule,
-    compute_interface_loop,
-    compute_mean_half_range,
-    compute_secant_stiffness,
     find_reversals,
+    measure_sampled_loop,
     sample_loop,
 )
 from ...response.measures import (
@@ -78,9 +76,7 @@ class BenchRun(SlideHistories):
         )
 
 
-def run_bench(
-    model, patch, steps: int, n_frames: int = 0, path=None, choice=None, say=None
-) -> BenchRun:
+def run_bench(model, patch, steps: int, n_frames: int = 0, choice=None, **options) -> BenchRun:
     """Compute the friction response of a model to its prescribed displacement with a number of steps.
 
     Parameters
@@ -93,20 +89,18 @@ def run_bench(
         Steps per cycle.
     n_frames : int
         Number of output frames of the fields.
-    path : SlideSamples, optional
-        Displacement path; default: the path of the model.
     choice : EngineChoice, optional
         Method of a sum over lists of bonds; default: by the tolerance.
-    say : callable, optional
-        Callback for messages about compilation.
+    **options
+        Path and callbacks of `follow_slide`.
     """
-    numerics = make_bench_numerics(model, steps, path)
+    numerics = make_bench_numerics(model, steps, options.get("path"))
     numerics = replace(numerics, choice=numerics.choice and (choice or numerics.choice))
-    return follow_slide(model, numerics, patch, n_frames, say, path=path)
+    return follow_slide(model, numerics, patch, n_frames, **options)
 
 
 def follow_slide(
-    model, numerics: Numerics, patch, n_frames: int = 0, say=None, progress=None, path=None
+    model, numerics: Numerics, patch, n_frames: int = 0, path=None, **callbacks
 ) -> BenchRun:
     """Compute the friction response of a model to a prescribed displacement.
 
@@ -120,10 +114,10 @@ def follow_slide(
         None for a single point.
     n_frames : int
         Number of output frames of the fields; the initial state is not one of them.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction.
     path : SlideSamples, optional
         Displacement path; default: the path of the model.
+    **callbacks
+        Fields `say` and `progress` of SlideTask.
 
     Raises
     ------
@@ -134,7 +128,7 @@ def follow_slide(
     time, slide, first, omega = sample_path(model, numerics.steps, path)
     frames = np.linspace(0, slide.size - 1, n_frames + 1).round().astype(int)[1:]
     frames = np.unique(frames[frames > 0])
-    histories = follow_path(SlideTask(model, patch, numerics, time, slide, frames, say, progress))
+    histories = follow_path(SlideTask(model, patch, numerics, time, slide, frames, **callbacks))
 
     # The measures of a loop exist only for a cyclic motion.
     values = _compute_measures(model, histories, first)
@@ -245,7 +239,5 @@ def _compute_loop_measures(
     # Without a mode there is no stiffness that damping could refer to, hence the 0.
     harmonic = compute_step_harmonic(time, means, omega)
     loop = sample_loop(time, slide, harmonic, omega, work[-1] - work[0])
-    measures = compute_interface_loop(compute_mean_half_range(reversals), *loop, 0.0)
-    measures["secant_stiffness"] = compute_secant_stiffness(reversals)
-    measures["drift_per_cycle"] = float(slide[-1] - slide[0])
-    return {name: value for name, value in measures.items() if value is not None}
+    measures = measure_sampled_loop(reversals, loop, 0.0)
+    return measures | {"drift_per_cycle": float(slide[-1] - slide[0])}

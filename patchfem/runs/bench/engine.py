@@ -70,7 +70,17 @@ class Numerics:
 
 
 def make_bench_numerics(model, steps: int, path: SlideSamples | None = None) -> Numerics:
-    """Return the Numerics of a bench with a number of steps per cycle, along its own path by default."""
+    """Return the Numerics of a bench.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the bench.
+    steps : int
+        Steps per cycle.
+    path : SlideSamples, optional
+        Path in place of that of the model.
+    """
     choice = None
     if find_method(model).startswith(BOND_LIST):
         slide = sample_path(model, steps, path).rel_disp
@@ -126,9 +136,16 @@ def uses_parallel_elements(model) -> bool:
 
 
 def sample_path(model, steps: int, path: SlideSamples | None = None) -> SlideSamples:
-    """Return the samples of a path, by default that of the model, to which a varying load adds some.
+    """Return the samples of a path, to which a varying load adds some, because it bends the force between them.
 
-    It bends the force between the samples of the slide.
+    Parameters
+    ----------
+    model : Model
+        Model of a bench.
+    steps : int
+        Steps per cycle.
+    path : SlideSamples, optional
+        Path in place of that of the model.
     """
     time, slide, first, omega = path or model.slide.samples(steps)
     if model.load_varies:

@@ -35,7 +35,17 @@ class _Branch(NamedTuple):
     ratio: float
 
     def follow(self, find_loop, limit: float, slide) -> np.ndarray:
-        """Return force [N], and slip [m], work and loss [J] since the start of the branch, (4, k), at slides (k,) [m]."""
+        """Return force [N], and slip [m], work and loss [J] since the start of the branch, (4, k).
+
+        Parameters
+        ----------
+        find_loop : callable
+            Function of amplitudes (k,) [m] that returns the steady loops.
+        limit : float
+            Force at which all elements slip [N].
+        slide : (k,) array
+            Slides [m].
+        """
         moved = np.asarray(slide) - self.place
         x = np.abs(moved) / self.ratio
         loop = find_loop(x)

@@ -10,12 +10,11 @@ from math import ceil, inf, pi, sqrt
 
 import numpy as np
 
+from ... import friction, structure
 from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
-from ...friction.bonds import engines
 from ...model.law import make_bond_parameters
 from ...model.model import MIN_RIG_REST_SPEED, Model
-from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 
 # Ratio of the stroke that bond summation has to resolve to the first stroke of a released motion.
 DECAYED_STROKE_RATIO = 1e-2
@@ -81,6 +80,7 @@ def _choose_sum(model: Model, keys, tolerance: float, stroke: float, steps: floa
         if accuracy.quadrature not in ("auto", "recursion"):
             name = accuracy.quadrature
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
+    engines = friction.bonds.engines
     requested = engines.RequestedEngine(name, tail, accuracy.merge)
     return engines.choose_engine(make_bonds(model, keys), tolerance, stroke, steps, requested)
 
@@ -104,7 +104,11 @@ def choose_bond_summation(model: Model, numerics):
         keys = interface.numbers
         if not sums_over_lists(model, keys):
             continue
-        amplitude = model.speed_scale / find_drive_omega(drive.signal) / keys.bond_length
+        amplitude = (
+            model.speed_scale
+            / structure.drive_sizes.find_drive_omega(drive.signal)
+            / keys.bond_length
+        )
         ratio = 1.0
         if is_stuck_by_printed_law(model, number):
             ratio = STICKING_STROKE_RATIO
@@ -117,7 +121,7 @@ def choose_bond_summation(model: Model, numerics):
         choices.append(
             _choose_sum(model, keys, model.accuracy.tolerance, stroke, numerics.steps / 2)
         )
-    return min(choices, key=lambda choice: choice.merge, default=engines.RECURSION)
+    return min(choices, key=lambda choice: choice.merge, default=friction.bonds.engines.RECURSION)
 
 
 def choose_slide_summation(model: Model, slide, *, is_smooth: bool = False):
@@ -152,15 +156,15 @@ def choose_slide_summation(model: Model, slide, *, is_smooth: bool = False):
     return choice
 
 
-def _find_load(model: Model, number: int) -> float:
-    """Return the normal load [N] of interface `number` of a rig."""
-    interfaces = model.rig.friction.interfaces
-    return model.nominal_load if len(interfaces) < 2 else interfaces[number].load
+def find_interface_load(model: Model, interface) -> float:
+    """Return the normal load [N] on an interface; that of the model for an interface without a load of its own."""
+    return model.nominal_load if interface.load is None else interface.load
 
 
 def _find_holding_ratio(model: Model, number: int) -> float:
     """Return the friction limit of interface `number` of a model over the force that holds it at rest."""
-    limit = model.rig.friction.interfaces[number].numbers.static * _find_load(model, number)
+    interface = model.rig.friction.interfaces[number]
+    limit = interface.numbers.static * find_interface_load(model, interface)
     holding_force = compute_holding_force(model.rig, number)
     return limit / holding_force if holding_force else inf
 
@@ -186,13 +190,13 @@ def compute_holding_force(rig, number: int = 0) -> float:
     """
     modes = rig.modes
     interfaces = modes.interfaces
-    omega = find_drive_omega(rig.drive.signal)
+    omega = structure.drive_sizes.find_drive_omega(rig.drive.signal)
 
     # Harmonic motion exp(i omega t) of the modes, with the forces at the interfaces that hold their slides at 0.
     moves = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix
     held = np.zeros(len(interfaces))
     whole = np.block([[moves, interfaces.T / modes.mass], [interfaces, np.diag(held)]])
-    push = modes.base * find_max_acceleration(rig.drive.signal)
+    push = modes.base * structure.drive_sizes.find_max_acceleration(rig.drive.signal)
     try:
         return float(abs(np.linalg.solve(whole, np.append(push, held))[modes.omega.size + number]))
     except np.linalg.LinAlgError:
@@ -217,7 +221,7 @@ def refuse_unresolved_bond_vibration(model: Model, numerics) -> None:
         keys = interface.numbers
         if sums_over_lists(model, keys) and not interface.partial_slip:
             mobility = float((modes.interfaces[number] ** 2).sum()) / modes.mass
-            stiffness = keys.static * _find_load(model, number) / keys.bond_length
+            stiffness = keys.static * find_interface_load(model, interface) / keys.bond_length
             omega = max(omega, sqrt(stiffness * mobility))
 
     if omega * period / numerics.steps > MAX_BOND_VIBRATION_PHASE:

@@ -65,9 +65,8 @@ def make_contact(model: Model, numerics, patch) -> contacts.Contact:
     # cases. Bands that yaw deform the same pieces, so that their elements are not parallel.
     slide_apart = rig is not None and rig.friction.bands_slide_apart
     has_lower = any(j.patch is not None and j.patch.model.gap.side == "lower" for j in joints)
-    uses_elements = not (fields or has_lower or slide_apart) and all(
-        has_elements(joint.keys) for joint in joints if joint.is_soft
-    )
+    soft_keys = [joint.keys for joint in joints if joint.is_soft]
+    uses_elements = not (fields or has_lower or slide_apart) and all(map(has_elements, soft_keys))
     moves = "sets" in fields
     sets = []
     for joint in joints:
@@ -283,7 +282,17 @@ def _choose_modes(joint: Joint, law, numerics, *, moves: bool) -> shear_modes.Sh
     most = MAX_STIFF_MODES if keys.law in laws.STIFF_LAWS else MAX_MODES
 
     def find_modes(limit, count: int | None, fall: float) -> shear_modes.ShearModes:
-        """Return a number of modes, or a sufficient one, for friction limits (m,) [N] and the steepest fall [1/m]."""
+        """Return shear modes.
+
+        Parameters
+        ----------
+        limit : (m,) array
+            Friction limits of the nodes [N].
+        count : int or None
+            Number of modes; None: a sufficient one.
+        fall : float
+            Steepest fall of the friction force over the slip, relative to its limit [1/m].
+        """
         compliance = patch.slip_compliance
         length = getattr(law, "length", None) or 0.0
         if not length and count is None:

@@ -84,10 +84,10 @@ class Joint(NamedTuple):
             return [self]
         rows = self.model.rig.modes.interfaces
         loads = bands.compute_band_loads(self.patch).tolist()
-        return [
-            self._replace(load=load, row=row, band=number)
-            for number, (load, row) in enumerate(zip(loads, rows))
-        ]
+        parts = []
+        for number, load in enumerate(loads):
+            parts.append(self._replace(load=load, row=rows[number], band=number))
+        return parts
 
 
 def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
@@ -118,6 +118,24 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
         is_soft = bool(interface.partial_slip)
         joints.append(Joint(model, interface.numbers, load, load, rows[k], own, is_soft))
     return joints
+
+
+def list_parts(model: Model, patch, meshed=()) -> list[Joint]:
+    """Return the interfaces of a model, or the bands of its face that slide apart.
+
+    Parameters
+    ----------
+    model : Model
+        Rig or bench with its interfaces.
+    patch : Patch or None
+        Patch of [contact]; None under [normal] and between masses.
+    meshed : tuple of int
+        Indices of the interfaces whose patches have a coarser mesh.
+    """
+    parts = []
+    for joint in list_joints(model, patch, meshed):
+        parts += joint.split_by_bands()
+    return parts
 
 
 def has_elements(law) -> bool:

@@ -281,6 +281,16 @@ def may_peak_at_side(patch: AreaPatch) -> bool:
     return bool(at_side * MAX_SIDE_RISE * np.sqrt(max(rigidity, 1.0)) >= largest_inside)
 
 
+def may_open_between_cells(pressure: np.ndarray) -> bool:
+    """Return whether a face whose cells (ny, nx) carry the pressure [Pa] may open in a square of less than four of them.
+
+    The pressure then falls by more than the lowest one from cell to cell.
+    """
+    row, column = np.unravel_index(np.argmin(pressure), pressure.shape)
+    around = pressure[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
+    return bool(around.max() > 2 * around.min() > 0)
+
+
 def with_face_measures(
     patches: "tuple[AreaPatch | None, ...]", tolerance: float
 ) -> "tuple[AreaPatch | None, ...]":
@@ -312,6 +322,8 @@ def with_face_measures(
         errors |= {name: by_edge[name] for name in EDGE_MEASURES}
     larger_terms = list_larger_terms(values, pieces.length / 2, pieces.width / 2)
     edge_error = MIN_CONTACT_EDGE_ERROR_IN_CELLS * n_edge_sides / active.size
+    if may_open_between_cells(patch.pressed.pressure):
+        edge_error += 4 / active.size
     area = pieces.length * pieces.width * pieces.pairs
     min_errors = {"contact_fraction": edge_error, "contact_area": edge_error * area}
     measures = {}

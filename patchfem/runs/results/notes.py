@@ -10,7 +10,7 @@ from math import ceil, log2
 import numpy as np
 
 from ... import friction
-from ...core import Outcome
+from ...core import Outcome, max_abs
 from ...effects import law_has_trait
 from ...formatting import format_length, format_quantity
 
@@ -49,7 +49,7 @@ def _warn_of_slow_forming(run) -> Iterator[str]:
     law = find_bonds(run.model)
     if law is None or law.reading != "report":
         return
-    speed = float(np.abs(run.solution.run.window.slide_rate).max())
+    speed = max_abs(run.solution.run.window.slide_rate)
     ratio = friction.bonds.parameters.growth_path_ratio(law, speed)
     if ratio > MAX_BOND_FORMING_SLIP_RATIO:
         # At this growth path, growth_path_ratio(law, speed) equals MAX_BOND_FORMING_SLIP_RATIO.

@@ -26,7 +26,7 @@ from ...response.errors import (
 )
 from ...response.measures import Values
 from ..bench.engine import Numerics
-from ..interfaces.bond_lists import choose_bond_summation
+from ..interfaces import bond_lists
 from ..patch import faces
 from .engines import ENGINES, divide_steps, enlarge_hybrid_steps, estimate_hybrid_errors
 from .evaluation import Solution, first_interface_load
@@ -63,7 +63,7 @@ def find_bond_summation(model: Model, numerics: Numerics):
         return numerics.choice
     laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
     has_bonds = any(law_has_trait(law, "bonds") for law in laws)
-    return choose_bond_summation(model, numerics) if has_bonds else None
+    return bond_lists.choose_bond_summation(model, numerics) if has_bonds else None
 
 
 def list_space_runs(
@@ -98,20 +98,8 @@ def list_space_runs(
         runs = tuple(replace(base, **change) for change in changes)
         coarser_runs.append(CoarserRuns(runs, rule, beside if runs else None, source))
 
-    def choose_mesh_rule(side: str, *, is_soft: bool):
-        """Return the rule of the error by the mesh of an interface, whose piece on a `side` has the pressure.
-
-        The error is of second order for shear modes, and for an interface that slips as a whole. The order of parallel
-        elements is at least 1.
-        """
-        if side == "lower":
-            return edge_errors
-        has_elements = is_soft and n_modes is None
-        return estimate_convergence_errors if has_elements else second_order_errors
-
-    steady = solution.steady
-    if steady is not None:
-        add("own", lambda values: {name: steady.errors.get(name, 0.0) for name in values})
+    if solution.steady is not None:
+        add("own", solution.steady.get_errors)
     elif not engine.has_steps and rig.friction.bands_slide_apart:
         # The measures of bands have the error of the trapezoidal rule with 400 samples per cycle.
         add("samples", estimate_sampling_errors)
@@ -120,12 +108,12 @@ def list_space_runs(
     # order of the cells of a face in time steps is at least 1.
     is_averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
     if n_coarse and (model.motion_depends_on_mesh or is_averaged):
-        rule = choose_mesh_rule(model.side, is_soft=bool(model.partial_slip))
+        has_elements = bool(model.partial_slip) and n_modes is None
+        rule = _choose_mesh_rule(model.side, has_elements=has_elements)
         has_cells = model.patch is not None and model.patch.area is not None and beside is not None
         if has_cells and rule is second_order_errors:
             rule = estimate_convergence_errors
         # A second coarser mesh shows the order. The elements of a rig have one, as those between masses.
-        has_elements = bool(model.partial_slip) and n_modes is None
         is_single = rule is second_order_errors or (has_elements and rig is not None)
         n_meshes = 1 if is_single or beside is None else 2
         modes = numerics.shear_modes if n_modes is None else n_modes
@@ -137,7 +125,8 @@ def list_space_runs(
         faces.group_interfaces_with_coarse_mesh(model) if model.has_interface_patches else ()
     ):
         interface = rig.friction.interfaces[numbers[0]]
-        rule = choose_mesh_rule(interface.patch.gap.side, is_soft=bool(interface.partial_slip))
+        has_elements = bool(interface.partial_slip) and n_modes is None
+        rule = _choose_mesh_rule(interface.patch.gap.side, has_elements=has_elements)
         add("mesh", rule, {"meshed": numbers})
     if n_modes is not None:
         fewer = slip.shear_modes.comparison_mode_count(n_modes)
@@ -172,6 +161,17 @@ def list_space_runs(
         numbers = ({"other_rig": number} for number in range(len(others)))
         add("reduced", estimate_errors_from_finer, *numbers)
     return coarser_runs
+
+
+def _choose_mesh_rule(side: str, *, has_elements: bool):
+    """Return the rule of the error by the mesh of an interface, whose piece on a `side` has the pressure.
+
+    The error is of second order for shear modes, and for an interface that slips as a whole. The order of parallel
+    elements is at least 1.
+    """
+    if side == "lower":
+        return edge_errors
+    return estimate_convergence_errors if has_elements else second_order_errors
 
 
 def _bound_bond_errors(model: Model, patch, solution: Solution, choice, values: Values) -> Values:

@@ -163,17 +163,16 @@ def steps_per_cycle(model: Model) -> int:
     if model.accuracy.steps_per_cycle:
         return model.accuracy.steps_per_cycle
     rig = model.rig
-    max_frequency_ratio = max(
+    period = rig.drive.signal.period
+    ratios = [
         structure.drive_sizes.find_max_frequency_ratio(rig.drive.signal),
-        float(rig.structure.frequencies.max()) * rig.drive.signal.period,
-    )
+        float(rig.structure.frequencies.max()) * period,
+    ]
     if model.load_varies:
-        max_frequency_ratio = max(
-            max_frequency_ratio, model.point.frequency * rig.drive.signal.period
-        )
+        ratios.append(model.point.frequency * period)
     # The error is proportional to the square of the step; 400 steps per cycle of the fastest motion
     # give 1e-3.
-    steps = 2 * round(200 * sqrt(1e-3 / model.accuracy.tolerance) * max_frequency_ratio)
+    steps = 2 * round(200 * sqrt(1e-3 / model.accuracy.tolerance) * max(ratios))
     return min(max(steps, 100), MAX_MARCH_STEPS_PER_CYCLE)
 
 
@@ -221,19 +220,17 @@ def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     steps = steps_per_cycle(model)
     if not structure.drive_sizes.is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / drive.cycles)))
-    numerics = Numerics(engine.name, steps, drive.cycles, window, accuracy.shear_modes)
-
+    local = 0.0
     if engine is HYBRID:
         # A rig without friction needs few steps. Otherwise the error per step is a small part of the tolerance.
-        is_exact = accuracy.method == "exact" or model.friction is None
+        steps = hybrid.cases.MIN_STEPS
         local = float(np.clip(1e-5 * accuracy.tolerance, MIN_RELATIVE_STEP_ERROR, 1e-8))
-        if is_exact:
+        if accuracy.method == "exact" or model.friction is None:
             local = hybrid.cases.EXACT_RTOL
-        return replace(numerics, local=local, steps=hybrid.cases.MIN_STEPS)
-    if engine is MARCH and accuracy.steps_per_cycle is None:
+    elif engine is MARCH and accuracy.steps_per_cycle is None:
         # The steps are short enough for a unique solution; comparison runs have half and a quarter of them.
-        return replace(numerics, steps=4 * ceil(max(steps, min_unique_steps(model)) / 4))
-    return numerics
+        steps = 4 * ceil(max(steps, min_unique_steps(model)) / 4)
+    return Numerics(engine.name, steps, drive.cycles, window, accuracy.shear_modes, local=local)
 
 
 def min_unique_steps(model: Model) -> int:
@@ -243,19 +240,10 @@ def min_unique_steps(model: Model) -> int:
     k_t = mu_s N/eps_0 and M is the mass that the interface moves.
     """
     f = model.friction
-    modes = model.rig.modes
-    if (
-        f is None
-        or not law_has_trait(f.law, "bonds")
-        or f.slip_growth is None
-        or not f.kinetic
-        or f.kinetic >= f.static
-    ):
+    if f is None or not law_has_trait(f.law, "bonds") or f.slip_growth is None or not f.kinetic:
         return 0
-    load = model.nominal_load
-    stiff = f.static * load / f.bond_length * (f.static / f.kinetic - 1)
-    return 2 * ceil(
-        0.55
-        * model.rig.drive.signal.period
-        * sqrt(stiff * float((modes.slide**2).sum()) / (2 * modes.mass))
-    )
+    modes = model.rig.modes
+    weakening = max(f.static / f.kinetic - 1, 0.0)
+    stiffness = f.static * model.nominal_load / f.bond_length * weakening
+    mobility = float((modes.slide**2).sum()) / modes.mass
+    return 2 * ceil(0.55 * model.rig.drive.signal.period * sqrt(stiffness * mobility / 2))

@@ -76,6 +76,10 @@ class SteadyPart:
     drive: SineDrive | None = None
     peak_error: float = np.nan
 
+    def get_errors(self, values: Values) -> Values:
+        """Return the known errors of measures by name, 0 for others."""
+        return {name: self.errors.get(name, 0.0) for name in values}
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
@@ -228,7 +232,14 @@ class RunEvaluator:
         Contact points, or laws of the engine `hybrid`.
     stick_tolerance : float
         Largest slip per cycle [m] at which the interface counts as stuck.
+
+    Attributes
+    ----------
+    prepare : dict
+        CPU time of each part of the preparation [s].
     """
+
+    prepare: Values
 
     def __init__(self, model, numerics, patch, contact, stick_tolerance: float):
         self.model = model
@@ -243,7 +254,7 @@ class RunEvaluator:
     def find_tail(self, run) -> VibratingMode | None:
         """Return the free vibration that remains after the last slip of a release, if the engine knows it."""
 
-    def solve(self, n_frames: int, progress, prepare: Values) -> Solution:
+    def solve(self, n_frames: int, progress) -> Solution:
         """Compute the motion of the rig, for one drive level after another, and its Solution.
 
         Parameters
@@ -252,8 +263,6 @@ class RunEvaluator:
             Number of snapshots of the interface in the last cycle.
         progress : callable or None
             Callback for the completed fraction.
-        prepare : dict
-            CPU time of each part of the preparation [s].
         """
         begin = measure_cpu_time()
         drive = self.model.rig.drive
@@ -263,7 +272,7 @@ class RunEvaluator:
         else:
             run = self.integrate(drive.signal, self.numerics.cycles, None, n_frames, progress)
         solution = self.make_solution(run, measure_cpu_time() - begin)
-        return replace(solution, prepare=prepare, levels=levels)
+        return replace(solution, prepare=self.prepare, levels=levels)
 
     def evaluate_measures(self, run, drive=None) -> Values:
         """Compute the measures of a run from its last cycles.
@@ -308,11 +317,20 @@ class RunEvaluator:
         return is_all_stuck(run.window, self.stick_tolerance)
 
     def make_solution(self, run, seconds: float, drive=None) -> Solution:
-        """Evaluate a run, which took some CPU seconds, and return its Solution.
+        """Evaluate a run and return its Solution.
 
         Measures follow from the last `numerics.window` cycles (`response.rows`). `run_errors` are the errors that the run
         itself shows: of sampling, and those of its engine. Errors due to steps and mesh need coarse runs and are not part
-        of it. `drive` is that of the model by default.
+        of it.
+
+        Parameters
+        ----------
+        run
+            Run of the engine.
+        seconds : float
+            CPU time of the run [s].
+        drive : optional
+            Drive of the run; default: that of the model.
         """
         drive = drive or self.model.rig.drive.signal
         values = self.evaluate_measures(run, drive)

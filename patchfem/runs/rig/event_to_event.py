@@ -10,10 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import compiled
+from ... import friction
 from ...convergence import convergence_error
 from ...core import NotConverged, Outcome, Response
-from ...friction.path_work import sampled_work
 from ...hybrid import cases
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid, masing
@@ -40,7 +39,6 @@ from . import engines
 from .evaluation import (
     EngineRun,
     RunEvaluator,
-    Solution,
     compute_sampled_loop,
     compute_work_check,
     describe_escape,
@@ -102,10 +100,8 @@ class ElementSnapshot(NamedTuple):
         return self.faces[0][1]
 
 
-def run_from_event_to_event(
-    model, numerics, patch, n_frames: int = 0, say=None, progress=None
-) -> Solution:
-    """Compute the motion of a rig from event to event, for one drive level after another.
+class LumpedEvaluator(RunEvaluator):
+    """Evaluator that computes runs of the engine `hybrid`, and measures from them.
 
     Parameters
     ----------
@@ -115,29 +111,15 @@ def run_from_event_to_event(
         Step tolerance, cycles and window.
     patch : Patch or None
         None under [normal] or between masses.
-    n_frames : int
-        Number of snapshots of the interface in the last cycle.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction.
-
-    Raises
-    ------
-    NotConverged
-        If a law or a mode is too fast for the engine.
+    joints : Joints, optional
+        Laws of the interfaces; they are made by default.
     """
-    begin = process_time()
-    joints = make_joints(model, numerics, patch)
-    prepare = {"reduce": process_time() - begin}
-    compiled.report_compilation_to(say)
-    return LumpedEvaluator(model, numerics, patch, joints).solve(n_frames, progress, prepare)
 
-
-class LumpedEvaluator(RunEvaluator):
-    """Evaluator that computes runs of the engine `hybrid`, and measures from them."""
-
-    def __init__(self, model, numerics, patch, joints: Joints):
+    def __init__(self, model, numerics, patch, joints: Joints | None = None):
+        begin = process_time()
+        self.joints = joints = joints or make_joints(model, numerics, patch)
         super().__init__(model, numerics, patch, joints, joints.stick_tolerance)
-        self.joints = joints
+        self.prepare = {"reduce": process_time() - begin}
         self.bands_slide_apart = model.rig.friction.bands_slide_apart and self.has_friction
 
     def integrate(
@@ -189,7 +171,17 @@ class LumpedEvaluator(RunEvaluator):
         numerics = self.numerics
 
         def advance(cycles: float, samples, travel: float):
-            """Return the `hybrid.runs.Motion` at samples (k,) [s]; it ends at the output `travel` [m]."""
+            """Return the motion of the engine.
+
+            Parameters
+            ----------
+            cycles : float
+                Number of cycles of the drive.
+            samples : (k,) array
+                Times of the samples [s].
+            travel : float
+                Output [m] at which the motion ends.
+            """
             schedule = cases.Schedule(cycles, numerics.window, np.unique(samples), travel)
             settings = {"rtol": numerics.local, "n_steps": numerics.steps}
             case = cases.make_rig_case(rig, self.joints.laws, schedule, signal=drive, **settings)
@@ -336,7 +328,8 @@ class LumpedEvaluator(RunEvaluator):
                 values["equivalent_damping"] = None
             work = window.extra["ledger"][0]
             # Friction work of all interfaces by the trapezoidal rule, and its magnitude
-            sampled = [sampled_work(*pair) for pair in zip(window.slides.T, window.forces.T)]
+            pairs = zip(window.slides.T, window.forces.T)
+            sampled = [friction.path_work.sampled_work(*pair) for pair in pairs]
             known = {
                 "sampled": sum(float(part.sum()) for part in sampled),
                 "passed": sum(float(abs(part).sum()) for part in sampled),

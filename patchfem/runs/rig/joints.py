@@ -18,7 +18,7 @@ from ...hybrid.laws import grooves, masing
 from ...hybrid.records import LawNumbers
 from ...model.model import Model
 from ..interfaces import averaged_law, bond_lists
-from ..interfaces.joints import Joint, find_climbed_grooves, list_joints
+from ..interfaces.joints import Joint, find_climbed_grooves, list_parts
 
 NO_STEADY_LOOP = (
     'bonds have a steady loop only with friction.reading = "stretch", friction.order = 1, a constant bond length and '
@@ -96,9 +96,7 @@ def make_joints(model: Model, numerics, patch) -> Joints:
     patch : Patch or None
         None without [contact].
     """
-    joints = []
-    for joint in list_joints(model, patch, numerics.meshed):
-        joints += joint.split_by_bands()
+    joints = list_parts(model, patch, numerics.meshed)
     pairs = []
     lengths = []
     for joint in joints:
@@ -145,7 +143,7 @@ def make_undriven_rig(model: Model, numerics, patch) -> UndrivenRig:
     PatchfemError
         If a law has no steady loop.
     """
-    joints = list_joints(model, patch, numerics.meshed)
+    joints = list_parts(model, patch, numerics.meshed)
     for joint in joints:
         if joint.is_soft and joint.elements is None:
             raise PatchfemError(NO_SOFT_LOOP)
@@ -158,6 +156,5 @@ def make_undriven_rig(model: Model, numerics, patch) -> UndrivenRig:
         )
         if joint.keys.rest_growth is not None or is_listed:
             raise PatchfemError(NO_STEADY_LOOP)
-    parts = [part for joint in joints for part in joint.split_by_bands()]
-    pairs = [(make_law(joint), make_load(joint)) for joint in parts]
+    pairs = [(make_law(joint), make_load(joint)) for joint in joints]
     return UndrivenRig(model.rig.modes, tuple(list_interfaces(model.rig, pairs)), len(pairs))

@@ -6,6 +6,7 @@ onset, found by bisection.
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -63,7 +64,19 @@ def run_levels(evaluator, n_frames: int = 0, progress=None):
     runs = []
 
     def solve(amplitude: float, before, n_frames: int = 0, report=None):
-        """Run a level from the end of the run `before`, or from rest; return the run and its Level."""
+        """Run a level, and return the run and its Level.
+
+        Parameters
+        ----------
+        amplitude : float
+            Drive level [m s-2].
+        before
+            Run from whose end the level goes on, or None for rest.
+        n_frames : int
+            Number of snapshots of the interface in the last cycle.
+        report : callable, optional
+            Callback for the completed fraction.
+        """
         signal = replace(sine, acceleration=amplitude)
         run = evaluator.integrate(signal, drive.levels.cycles, before, n_frames, report)
         values = evaluator.evaluate_measures(run, signal)
@@ -75,15 +88,11 @@ def run_levels(evaluator, n_frames: int = 0, progress=None):
         """Run a level from the final state of level `number`, or from rest if it is -1."""
         return solve(amplitude, runs[number] if number >= 0 else None)[1]
 
-    def report(fraction: float) -> None:
-        """Report the completed fraction of all levels, given that of the present one."""
-        if progress is not None:
-            progress((len(runs) + fraction) / len(amplitudes))
-
     # Each level goes on from the end of the one before; a run that ends early is the last one.
     levels = []
     for amplitude in amplitudes:
         is_last = len(runs) + 1 == len(amplitudes)
+        report = progress and partial(_report_level, progress, len(runs), len(amplitudes))
         run, level = solve(amplitude, runs[-1] if runs else None, n_frames * is_last, report)
         runs.append(run)
         levels.append(level)
@@ -103,6 +112,11 @@ def run_levels(evaluator, n_frames: int = 0, progress=None):
         phasors=np.concatenate([run.phasors for run in runs]),
     )
     return joined, LevelRuns(tuple(levels), run_level, evaluator.stick_tolerance)
+
+
+def _report_level(progress, number: int, n_levels: int, fraction: float) -> None:
+    """Report the completed fraction of all levels, of which `number` are complete, and `fraction` of the next one."""
+    progress((number + fraction) / n_levels)
 
 
 def _join_histories(histories, shifts: list[float]) -> Response:

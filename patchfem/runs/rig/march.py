@@ -17,7 +17,6 @@ from ..interfaces import bands
 from ..interfaces.contact_points import make_contact
 from .evaluation import (
     RunEvaluator,
-    Solution,
     compute_sampled_loop,
     compute_work_check,
     describe_escape,
@@ -28,8 +27,8 @@ from .evaluation import (
 MAX_HELD_MOVE = 1e-9
 
 
-def march_in_time(model, numerics, patch, n_frames: int = 0, say=None, progress=None) -> Solution:
-    """Integrate the motion of a rig in time steps and evaluate its measures, without errors from coarse runs.
+class MarchEvaluator(RunEvaluator):
+    """Evaluator that computes runs with equal time steps, and measures from them.
 
     Parameters
     ----------
@@ -39,23 +38,15 @@ def march_in_time(model, numerics, patch, n_frames: int = 0, say=None, progress=
         Steps per cycle, cycles and window.
     patch : Patch or None
         None under [normal] and between masses.
-    n_frames : int
-        Number of snapshots of the interface in the last cycle.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction.
+    say : callable, optional
+        Callback for a line of text.
     """
-    begin = process_time()
-    contact = make_contact(model, numerics, patch)
-    reduced = process_time() - begin
-    engine.load_kernels(contact, say)
-    prepare = {"reduce": reduced, "compiled_code": process_time() - begin - reduced}
-    return MarchEvaluator(model, numerics, patch, contact).solve(n_frames, progress, prepare)
 
-
-class MarchEvaluator(RunEvaluator):
-    """Evaluator that computes runs with equal time steps, and measures from them."""
-
-    def __init__(self, model, numerics, patch, contact):
+    def __init__(self, model, numerics, patch, say=None):
+        begin = process_time()
+        contact = make_contact(model, numerics, patch)
+        reduced = process_time() - begin
+        engine.load_kernels(contact, say)
         stick_tolerance = 0.0
         if model.friction is not None and contact.set_valued:
             drive = model.rig.drive.signal
@@ -63,6 +54,8 @@ class MarchEvaluator(RunEvaluator):
         elif model.friction is not None:
             stick_tolerance = 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, stick_tolerance)
+        loaded = process_time() - begin - reduced
+        self.prepare = {"reduce": reduced, "compiled_code": loaded}
 
     def integrate(
         self, drive, cycles: float, before: engine.Motion | None, n_frames: int = 0, progress=None

@@ -10,7 +10,7 @@ from math import ceil, floor, log, log2
 
 import numpy as np
 
-from ... import structure
+from ... import compiled, structure
 from ...convergence import convergence_error
 from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...model import rig as model_rig
@@ -74,14 +74,17 @@ def solve_rig(model, numerics, patch, n_frames: int = 0, say=None, progress=None
     """
     # Only the module of this engine is loaded.
     if numerics.engine == "bench":
-        return slides.solve_slide(model, numerics, patch, n_frames, say, progress)
+        run = bench.follow_slide(model, numerics, patch, n_frames, say=say, progress=progress)
+        return slides.make_slide_solution(run)
+    if numerics.engine == "harmonic":
+        solution = shooting.solve_steady_motion(model, numerics, patch, n_frames, say)
+        return replace_output_by_gauge(model, solution)
     if numerics.engine == "hybrid":
-        run = event_to_event.run_from_event_to_event
-    elif numerics.engine == "march":
-        run = march.march_in_time
+        compiled.report_compilation_to(say)
+        evaluator = event_to_event.LumpedEvaluator(model, numerics, patch)
     else:
-        run = shooting.solve_steady_motion
-    return replace_output_by_gauge(model, run(model, numerics, patch, n_frames, say, progress))
+        evaluator = march.MarchEvaluator(model, numerics, patch, say)
+    return replace_output_by_gauge(model, evaluator.solve(n_frames, progress))
 
 
 class Runner:
@@ -263,24 +266,20 @@ def run_motion(inputs: RunInputs) -> Result:
     PatchfemError
         If the drive excites no mode.
     """
-    if inputs.plan.model.rig is not None:
-        return _run_rig(inputs)
-    run, _ = run_refined(inputs, choose_numerics(inputs.plan.model))
-    measures = run.measures if run.has_errors else remove_errors(run.measures)
-    return _make_result(replace(run, outcome=Outcome.DONE, measures=measures))
-
-
-def _run_rig(inputs: RunInputs) -> Result:
-    """Compute the motion of a rig and return its Result."""
     model = inputs.plan.model
     rig = model.rig
-    if rig.start is None and rig.drive.kind != "free" and not np.any(rig.modes.base):
+    numerics = choose_numerics(model)
+    if rig is None:
+        run, _ = run_refined(inputs, numerics)
+        measures = run.measures if run.has_errors else remove_errors(run.measures)
+        return _make_result(replace(run, outcome=Outcome.DONE, measures=measures))
+
+    is_free = rig.drive.kind == "free"
+    if rig.start is None and not is_free and not np.any(rig.modes.base):
         raise PatchfemError(
             "the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
             "drive.kind",
         )
-
-    numerics = choose_numerics(model)
     if not inputs.plan.draws_curve and ENGINES[numerics.engine].finds_periodic_motion:
         numerics = replace(numerics, whole=False)
     if numerics.engine == "march":
@@ -300,12 +299,21 @@ def _run_rig(inputs: RunInputs) -> Result:
     # The reasons of missing values depend on the outcome, so that they come after it.
     found = run.solution.levels
     if found is not None and run.has_friction:
-        tolerance = model.accuracy.tolerance
-        onset = levels.measure_onset_level(rig, found, run.coarser, tolerance)
+        onset = levels.measure_onset_level(rig, found, run.coarser, model.accuracy.tolerance)
         run = replace(run, measures=run.measures | {"onset_level": onset})
     run = complete_measures(run)
-    if rig.drive.kind == "free" and run.has_errors:
-        run = _add_decay_curve(run)
+    decay = None
+    if is_free and run.has_errors:
+        decay = decays.compute_decay_curve(run.solution, run.coarser)
+    if decay is not None:
+        space_runs = comparisons.list_space_runs(
+            model, run.numerics, run.patch, inputs.n_coarse, run.solution
+        )
+        has_mesh_run = any(one.source == "mesh" for one in space_runs)
+        decay, notes = decays.add_mesh_errors(
+            decay, model, inputs.patches, inputs.stiffer, has_mesh_run=has_mesh_run
+        )
+        run = replace(run, decay=decay, notes=notes)
     if run.has_friction and structure.drive_sizes.find_decay_rate(rig.modes) < 0:
         measures, notes = flutter.compute_flutter_amplitude(run)
         run = replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
@@ -316,35 +324,57 @@ def _make_result(run: CoupledRun) -> Result:
     """Return the Result of a run whose measures are complete."""
     inputs = run.inputs
     model = run.model
+    rig = model.rig
     solution = run.solution
     motion = solution.run
+    engine = ENGINES[run.numerics.engine]
 
     # Warnings and notes see the measures before their floors are raised to the tolerance.
     warnings, notes = collect_remarks(run)
     notes = [*inputs.notes, *notes, *run.notes]
     measures = set_final_floors(run.measures, model.accuracy.tolerance)
-    if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
+    if engine.finds_periodic_motion and run.outcome is Outcome.GROWS:
         measures = reasons.find_missing_unbounded(measures)
-    if model.rig is not None and model.rig.drive.waveform.is_random:
-        notes += stationary.warn_if_short(measures, motion.window)
+
+    # What a motion has beside measures and histories
+    data = MotionData(step_runs=run.step_runs)
+    if rig is not None:
+        spectra = None
+        if rig.drive.waveform.is_random:
+            notes += stationary.warn_if_short(measures, motion.window)
+            spectra = stationary.compute_spectra(motion.window, rig.drive.signal)
+        found = solution.levels.levels if solution.levels is not None else ()
+        data = data._replace(
+            period=run.drive.period,
+            energies=motion.ledger,
+            levels=levels.convert_to_scene_units(rig, found),
+            events=motion.log,
+            decay=run.decay,
+            spectra=spectra,
+            steady=solution.steady and solution.steady.data,
+        )
 
     # The fields of [contact], and those of the patches of [[structure.interface]].
     fields = {}
-    if inputs.patch is not None and model.rig is None:
+    if inputs.patch is not None and rig is None:
         fields = slides.collect_slide_frames(model, inputs.patch, motion.response)
     elif inputs.patch is not None:
         fields = interface_fields.collect_interface_fields(
             model, run.numerics, inputs.patch, solution
         )
-    moved = ()
+    faces = ()
     if model.has_interface_patches:
-        is_hybrid = not ENGINES[run.numerics.engine].has_steps
-        snapshots = motion.snapshots if is_hybrid else ()
-        moved = interface_fields.add_slip_fields(model, inputs.faces, snapshots)
+        snapshots = () if engine.has_steps else motion.snapshots
+        faces = interface_fields.add_slip_fields(model, inputs.faces, snapshots)
 
+    # The slide at an interface may exceed the overlap of its pieces.
+    outcome = run.outcome
+    for face in inputs.faces:
+        slide = face.slide(motion.response)
+        outcome = check_pieces_overlap(outcome, face.model.patch, face.patch, slide)
     return Result(
         plan=inputs.plan,
-        outcome=_find_final_outcome(run),
+        outcome=outcome,
         measures=measures,
         seconds=inputs.seconds,
         warnings=[*inputs.warnings, *warnings],
@@ -352,10 +382,10 @@ def _make_result(run: CoupledRun) -> Result:
         patch=inputs.patch,
         fields=fields,
         response=motion.response,
-        window=motion.response if model.rig is None else motion.window,
+        window=motion.response if rig is None else motion.window,
         settings=run.settings,
-        motion=_collect_motion(run),
-        faces=moved,
+        motion=data,
+        faces=faces,
     )
 
 
@@ -415,9 +445,16 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
     first = runner.solve(numerics, inputs.say, n_frames)
     inputs.seconds.update({stage: first.seconds} | first.prepare)
 
-    # On a belt, the window must contain a complete stick-slip period, which the first run shows.
-    n_cycles = 0 if rig is None else _count_slip_period_cycles(model, numerics, first)
-    if n_cycles > numerics.window:
+    # A belt moves on at constant speed, so that the drive has no period, but the stick-slip motion has one, which the first
+    # run shows. The window must contain a complete period, and the run two of them.
+    n_cycles = 0
+    drive = None if rig is None else rig.drive.signal
+    if rig is not None and model.friction is not None and drive.segments:
+        if not structure.drive_sizes.is_periodic(drive):
+            response = first.run.response
+            period = find_slip_period(response.time, response.slide_rate)
+            n_cycles = ceil(period / drive.period)
+    if numerics.window < n_cycles <= numerics.cycles / 2:
         numerics = replace(numerics, window=n_cycles)
         first = runner.solve(numerics, inputs.say, n_frames)
     if not inputs.estimate or first.run.outcome is Outcome.NOT_CONVERGED:
@@ -469,21 +506,6 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
     return replace(run, measures=run.measures | peak), shortage
 
 
-def _count_slip_period_cycles(model, numerics, solution) -> int:
-    """Return how many cycles the stick-slip motion on a belt takes to repeat; 0 if it does not.
-
-    A belt moves on at constant speed, so that the drive has no period, but the stick-slip motion has one. The cycles are
-    those of `drive.period`. The result is also 0 if the run is shorter than two periods of the motion. `model` has the
-    drive and the friction law, `numerics` the cycles of the run, and `solution` is its motion.
-    """
-    drive = model.rig.drive.signal
-    if model.friction is None or not drive.segments or structure.drive_sizes.is_periodic(drive):
-        return 0
-    response = solution.run.response
-    n_cycles = ceil(find_slip_period(response.time, response.slide_rate) / drive.period)
-    return n_cycles if 2 * n_cycles <= numerics.cycles else 0
-
-
 def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     """Decide whether a run is repeated with smaller steps, and return the next steps as a Verdict.
 
@@ -492,29 +514,39 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     except in a run that takes little time (MAX_NODE_STEPS_FOR_OTHER_MEASURES).
     """
     numerics = run.numerics
-    max_passes = _count_finer_passes(run)
-    if not max_passes:
+    accuracy = run.model.accuracy
+    rig = run.model.rig
+    if rig is None:
+        # The steps of a prescribed slide are refined together with the meshes (`refine.judge_pass`).
         return refine.Verdict(0.0)
+
+    # How many times the run can be repeated with smaller steps than before
+    ledger = run.solution.run.ledger
+    if numerics.local:
+        max_passes = ceil(log(numerics.local / MIN_RELATIVE_STEP_ERROR, 100) - 1e-9)
+    else:
+        has_automatic_steps = ENGINES[numerics.engine].has_steps and not accuracy.steps_per_cycle
+        max_steps = min(MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS / numerics.cycles)
+        if not has_automatic_steps or run.solution.run.outcome in EARLY_OUTCOMES:
+            max_steps = numerics.steps
+        max_passes = floor(log2(max_steps / numerics.steps))
+    if max_passes <= 0:
+        return refine.Verdict(0.0)
+
     # Work of the run: steps times nodes, and more if each step presses the patch.
-    counters = run.solution.run.ledger
-    pressed = [face.patches[0] for face in run.inputs.faces]
-    nodes = max(
-        1.0,
-        *(patch.x.size for patch in pressed),
-        *(counters.get(name, 0.0) for name in ("points", "strips")),
-    )
-    work = numerics.steps * numerics.cycles * nodes
-    if run.model.rig.friction.load_varies and run.patch is not None:
+    counts = [face.patches[0].x.size for face in run.inputs.faces]
+    counts += [ledger.get("points", 0.0), ledger.get("strips", 0.0), 1.0]
+    work = numerics.steps * numerics.cycles * max(counts)
+    if rig.friction.load_varies and run.patch is not None:
         work *= PRESSING_STEP_WORK_RATIO
 
     # All measures count in a run that takes little time, else the main ones.
-    tolerance = run.model.accuracy.tolerance
-    measures = set_final_floors(complete_measures(run).measures, tolerance)
+    measures = set_final_floors(complete_measures(run).measures, accuracy.tolerance)
     if work > MAX_NODE_STEPS_FOR_OTHER_MEASURES:
         measures = {name: one for name, one in measures.items() if refine.is_main(name)}
     # The engine `hybrid` estimates the error of its steps itself.
     axis = "own" if numerics.local else "steps"
-    excess = refine.find_worst_measure(measures, tolerance, [axis]).excess
+    excess = refine.find_worst_measure(measures, accuracy.tolerance, [axis]).excess
     has_stalled = len(excesses) > 1 and excess >= excesses[-2]
     if not excess or has_stalled:
         return refine.Verdict(excess)
@@ -528,27 +560,11 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     )
 
 
-def _count_finer_passes(run: CoupledRun) -> int:
-    """Return how many times a run can be repeated with smaller steps than before."""
-    numerics = run.numerics
-    if run.model.rig is None:
-        return 0  # those of a prescribed slide are refined together with the meshes (`refine.judge_pass`)
-    if numerics.local:
-        return ceil(log(numerics.local / MIN_RELATIVE_STEP_ERROR, 100) - 1e-9)
-    if (
-        not ENGINES[numerics.engine].has_steps
-        or run.model.accuracy.steps_per_cycle is not None
-        or run.solution.run.outcome in EARLY_OUTCOMES
-    ):
-        return 0
-    max_steps = min(MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS / numerics.cycles)
-    return max(0, floor(log2(max_steps / numerics.steps)))
-
-
 def _find_peak_frequency(solution: Solution, coarser=()) -> Measures:
-    """Return a dict with the frequency [Hz] of the peak of a response curve and its error; {} without a curve.
+    """Return a dict with the frequency and the half-power width [Hz] of the peak of a response curve; {} without a curve.
 
-    The measure has no value if the amplitude is 0. The shift of the peaks of `coarser` runs is part of the error.
+    The frequency has no value if the amplitude is 0, and a curve that is not drawn has no width. The shift of the peaks of
+    `coarser` runs is part of the error.
     """
     steady = solution.steady
     if steady is None or np.isnan(steady.peak_error):
@@ -562,7 +578,9 @@ def _find_peak_frequency(solution: Solution, coarser=()) -> Measures:
     ]
     shift = float(np.abs(np.array(others) - peak).max(initial=0.0))
     error = steady.peak_error + convergence_error(shift)
-    return {"peak_frequency": Measure(peak, "Hz", error, 0.0)}
+    measures = {"peak_frequency": Measure(peak, "Hz", error, 0.0)}
+    width = steady.data.width
+    return measures if width is None else measures | {"peak_width": width}
 
 
 # ---- completion
@@ -611,67 +629,3 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
     other_modes = rig.first_mode.fraction_of_other_modes(window.modal)
     measures |= reasons.find_missing(measures, window, run.drive, run.has_friction, other_modes)
     return replace(run, outcome=outcome, measures=measures)
-
-
-def _add_decay_curve(run: CoupledRun) -> CoupledRun:
-    """Return a released run with its decay curve, including mesh errors.
-
-    A note says where the mesh error is unknown.
-    """
-    model = run.model
-    solution = run.solution
-    run = replace(run, decay=decays.compute_decay_curve(solution, run.coarser))
-    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
-    if run.decay is None or not has_partial_slip:
-        return run
-
-    # Below the slip of the first node, two meshes have the same decay, so that static loops give the mesh error.
-    decay = run.decay
-    coarse = run.inputs.coarse[0]
-    mesh_errors = decays.estimate_stuck_mode_mesh_errors(
-        decay.amplitude, decay.frequency[-1], model, run.patch, coarse, run.inputs.stiffer
-    )
-    frequency_error, damping_error = mesh_errors.errors
-    decay = decay._replace(
-        frequency_error=np.fmax(decay.frequency_error, frequency_error),
-        damping_error=np.fmax(decay.damping_error, damping_error),
-    )
-    if not mesh_errors.reason:
-        return replace(run, decay=decay)
-    coarser = comparisons.list_space_runs(
-        model, run.numerics, run.patch, run.inputs.n_coarse, solution
-    )
-    note = decays.describe_unknown_mesh_error(mesh_errors.reason, coarser)
-    return replace(run, decay=decay, notes=(note,))
-
-
-def _find_final_outcome(run: CoupledRun) -> Outcome:
-    """Return the outcome of a run, or LEAVES_CONTACT if the slide at an interface exceeds the overlap of its pieces."""
-    outcome = run.outcome
-    for face in run.inputs.faces:
-        slide = face.slide(run.solution.run.response)
-        outcome = check_pieces_overlap(outcome, face.model.patch, face.patch, slide)
-    return outcome
-
-
-def _collect_motion(run: CoupledRun) -> MotionData:
-    """Return what the Result states of a motion beside measures and histories, as MotionData."""
-    solution = run.solution
-    if run.model.rig is None:
-        return MotionData(step_runs=run.step_runs)
-    drive = run.model.rig.drive
-    spectra = None
-    if drive.waveform.is_random:
-        spectra = stationary.compute_spectra(solution.run.window, drive.signal)
-    return MotionData(
-        period=run.drive.period,
-        energies=solution.run.ledger,
-        step_runs=run.step_runs,
-        levels=levels.convert_to_scene_units(
-            run.model.rig, solution.levels.levels if solution.levels else ()
-        ),
-        events=solution.run.log,
-        decay=run.decay,
-        spectra=spectra,
-        steady=solution.steady and solution.steady.data,
-    )

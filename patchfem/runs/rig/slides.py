@@ -9,25 +9,6 @@ from ..results.result import SlipRule, make_interface_frames
 from .evaluation import EngineRun, Solution
 
 
-def solve_slide(model, numerics, patch, n_frames: int = 0, say=None, progress=None) -> Solution:
-    """Compute the friction of a bench along its prescribed slide, as the Solution of a motion.
-
-    Parameters
-    ----------
-    model : Model
-        Model of a bench.
-    numerics : Numerics
-        Steps per cycle, and methods of bond summation and of shear.
-    patch : Patch or None
-        None for a single point.
-    n_frames : int
-        Number of frames of the fields.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction.
-    """
-    return make_slide_solution(bench.follow_slide(model, numerics, patch, n_frames, say, progress))
-
-
 def make_slide_solution(run: bench.BenchRun) -> Solution:
     """Return the Solution of a run along a prescribed slide; its window is the last cycle of the path."""
     ledger = {

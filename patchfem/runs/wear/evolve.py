@@ -6,7 +6,7 @@ results as an uninterrupted run.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from time import process_time
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
+from ...core import PatchfemError, array_dataclass, frozen_array
 from ...model.patch import PatchPiece
 from ...model.wear import interpolate_nodes
 from ...time_steps.checkpoint import RETRY_ADVICE, read_state, write_state
@@ -65,7 +65,7 @@ class WearMoment(NamedTuple):
     values: dict[str, float]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class WornPatch:
     """Worn patch with its wear history, on the finest mesh and on coarser meshes.
 
@@ -272,11 +272,7 @@ def make_worn_model(model, patch, depth):
 
     # The friction of a rig is also that of its interface.
     law = wear.friction.compute_worn_law(model.friction, mean_depth)
-    rig = model.rig
-    if rig is not None:
-        interfaces = tuple(replace(face, numbers=law) for face in rig.friction.interfaces)
-        rig = replace(rig, friction=replace(rig.friction, interfaces=interfaces))
-    return replace(model, friction=law, rig=rig)
+    return replace(model, friction=law, rig=model.rig and model.rig.with_law(law))
 
 
 def compute_wear(

@@ -287,7 +287,7 @@ def _count_path_cycles(model, window) -> int:
     if model.rig is None:
         return 1
     repeat = model.rig.count_repeat_cycles(model.point) or 1.0
-    n_cycles = round((window.time[-1] - window.time[0]) / model.rig.drive.signal.period)
+    n_cycles = round(window.span / model.rig.drive.signal.period)
     return max(1, min(round(repeat), n_cycles))
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import NotConverged, Response, SineDrive
+from ....core import Measure, NotConverged, Response, SineDrive
 from ....formatting import format_quantity
 from ....response.errors import compute_absolute_changes
 from ....response.measures import Values
@@ -165,16 +165,19 @@ class ObservedMotion(NamedTuple):
     fundamental: float | None = None
 
 
+NO_FOLDS = np.zeros((2, 0))
+
+
 class ResponseCurve(NamedTuple):
     """Response curve over the drive frequency.
 
     - points: list of CurvePoint, in order along the curve.
-    - folds: frequencies [Hz] at which the curve turns back.
+    - folds (2, f): frequencies [Hz] at which the curve turns back, and their errors.
     - notes: sentences on a part of the sweep that the curve does not reach.
     """
 
     points: list[CurvePoint]
-    folds: tuple[float, ...] = ()
+    folds: np.ndarray = NO_FOLDS
     notes: tuple[str, ...] = ()
 
 
@@ -197,11 +200,11 @@ def find_largest_point(points) -> int:
     return int(np.argmax(np.where(is_stable | ~is_stable.any(), sizes, -2.0)))
 
 
-def tabulate_curve(points, folds=()) -> Arrays:
+def tabulate_curve(points, folds=NO_FOLDS) -> Arrays:
     """Return the columns of a response curve as a dict; NaN for unbounded motions.
 
     The columns are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES
-    with its error. `folds` are the frequencies [Hz] at which the curve turns back.
+    with its error. `folds` (2, f) are the frequencies [Hz] at which the curve turns back, and their errors.
     """
     columns = {
         "frequency": np.array([point.drive.omega / (2 * np.pi) for point in points]),
@@ -213,8 +216,46 @@ def tabulate_curve(points, folds=()) -> Arrays:
     return columns | {
         "regime": np.array([point.regime for point in points]),
         "multiplier": np.array([point.multiplier for point in points]),
-        "folds": np.array(folds),
+        "folds": folds[0],
+        "fold_errors": folds[1],
     }
+
+
+def measure_half_power_width(curve: Arrays) -> Measure:
+    """Return the width [Hz] of the highest peak of a drawn response curve, between both half-power points.
+
+    The inverse square of the amplitude is interpolated over the frequency. The error is the difference of a parabola from a
+    line, and that by the errors of the amplitudes.
+
+    Parameters
+    ----------
+    curve : dict
+        Columns of `tabulate_curve`.
+    """
+    amplitude = curve["amplitude"]
+    top = int(np.nanargmax(amplitude))
+    ends = []
+    error = 0.0
+    for direction in (-1, 1):
+        inverse = (amplitude[top] / amplitude[top::direction]) ** 2
+        frequency = curve["frequency"][top::direction]
+        relative = (curve["amplitude_error"] / amplitude)[top::direction]
+        low = np.flatnonzero(~(inverse < HALF_POWER))
+        if not low.size or not np.isfinite(inverse[low[0]]):
+            return Measure(None, "Hz", None, 0.0, reason=NO_WIDTH_REASON)
+
+        # A line between the last point above half the power and the first one below it, corrected by the parabola
+        first = low[0] - 1
+        slope = np.diff(frequency)[first] / np.diff(inverse)[first]
+        place = frequency[first] + (HALF_POWER - inverse[first]) * slope
+        near = slice(max(first - 1, 0), first + 2)
+        scaled = frequency[near] - place
+        bent = np.polynomial.Polynomial.fit(scaled, inverse[near], scaled.size - 1)
+        shift = (HALF_POWER - bent(0.0)) * slope
+        ends.append(place + shift)
+        error += abs(shift)
+        error += 2 * HALF_POWER * abs(slope) * float(relative[near].max() + relative[0])
+    return Measure(abs(ends[1] - ends[0]), "Hz", error, 0.0)
 
 
 def estimate_point_errors(values: Values, relative: float = 0.0) -> Values:
@@ -260,6 +301,8 @@ WIDTH_HEIGHT_FRACTION = 0.9  # Fraction of the height of a peak at which its wid
 # Ratio of the shift of a peak to its width times the relative error of its height. The width is
 # measured a tenth below the peak, so that an error of a tenth shifts it by its width.
 ERROR_SHIFT_FACTOR = 10.0
+HALF_POWER = 2.0  # inverse square of the amplitude at half the power, relative to the peak
+NO_WIDTH_REASON = "the curve does not fall to half the power on both sides of its peak"
 SHIFT_SAFETY_FACTOR = 2.0  # error of the position of a peak, relative to its last shift
 # Relative rise of a peak over a point at the distance of its width
 RISE_AT_WIDTH = 1 / WIDTH_HEIGHT_FRACTION - 1
@@ -538,10 +581,12 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
     points, best, above = peak[:3]
     peak_point = points[best]
     solution = finder.compute_steady_motion(peak_point.drive, peak_point.guess)
+    columns = tabulate_curve(points, curve.folds)
+    width = measure_half_power_width(columns) if finder.draws_curve else None
     height = peak_point.values.get(AMPLITUDE, 0.0)
     steady = replace(
         solution.steady,
-        data=solution.steady.data._replace(curve=tabulate_curve(points, curve.folds)),
+        data=solution.steady.data._replace(curve=columns, width=width),
         notes=(*solution.steady.notes, *curve.notes),
         drive=peak_point.drive,
         peak_error=np.inf if height == 0 else 0.0,

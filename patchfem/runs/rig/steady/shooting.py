@@ -5,6 +5,7 @@ multipliers and stability, and the largest motion of a response curve over frequ
 where it may have some (`hybrid.periodic_curves`).
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from time import process_time
@@ -22,7 +23,7 @@ from ....hybrid.periodic_curves import (
     PathSettings,
     measure_distance,
 )
-from ....hybrid.records import Probe, Status, Window
+from ....hybrid.records import Face, Probe, Setting, Status, Window
 from ....response.measures import Values
 from ....response.rows import AMPLITUDE, select_names
 from ....response.spectrum import make_acceleration_measures
@@ -62,10 +63,10 @@ FREQUENCY_PATH = PathSettings(first_step=0.0125, max_step=0.05)
 WEAK_DRIVE = 1e-2
 MAX_LEVEL_RATIO = 10.0
 LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
-# Distance of points beside the estimate of a peak, relative to its smaller width at 0.9 of its height, and ratio of both
+# Distance of a point beside the estimate of a peak, relative to its smaller width at 0.9 of its height, and ratio of both
 # widths above which the wider side is a shoulder
-SIDE_POINT_FRACTION = 0.2
-SHOULDER_RATIO = 2.0
+SIDE_POINT_FRACTION = 0.1
+SHOULDER_RATIO = 2.5
 
 
 class ShootingFinder:
@@ -103,6 +104,28 @@ class ShootingFinder:
         schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
         rig = self.model.rig
         return cases.make_rig_case(rig, self.joints.laws, schedule, signal=drive, rtol=RTOL)
+
+    def _vary(self, drive: SineDrive, make_drive: Callable[[float], SineDrive]):
+        """Return a function of a parameter that returns the case of its drive, with the arrays of that of another drive.
+
+        Under a load that oscillates each case has arrays of its own, because the longest step depends on both periods.
+        """
+        case = self.make_case(drive)
+        if case.rig.faces[:, Face.SWING].any():
+            return lambda parameter: self.make_case(make_drive(parameter))
+        step_ratio = case.rig.settings[Setting.LONGEST_STEP] / case.rig.settings[Setting.PERIOD]
+
+        def make_case(parameter: float) -> cases.Case:
+            """Return the case of a period under the drive of a parameter."""
+            sine = make_drive(parameter)
+            settings = case.rig.settings.copy()
+            settings[[Setting.OMEGA, Setting.PERIOD]] = sine.omega, sine.period
+            settings[Setting.LONGEST_STEP] = step_ratio * sine.period
+            tones = np.array([[sine.acceleration, sine.omega, 0.0]])
+            rig = case.rig._replace(settings=settings, tones=tones)
+            return replace(case, rig=rig, ends=np.array([sine.period]))
+
+        return make_case
 
     def find_periodic_motion(
         self, drive, guess=None, *, needs_stability: bool = True
@@ -294,7 +317,7 @@ class ShootingFinder:
         weak = replace(drive, acceleration=WEAK_DRIVE * level)
         start = self.find_periodic_motion(weak).run.final
         equations = MotionCurve(
-            lambda level: self.make_case(replace(drive, acceleration=level)),
+            self._vary(weak, lambda level: replace(drive, acceleration=level)),
             start,
             weak.acceleration,
             has_kinks=self.joints.has_kinks,
@@ -491,20 +514,19 @@ class ShootingFinder:
             start = periodic.Start(balanced.make_start(self.make_case(sine)))
             top = self.compute_curve_point(sine, start, needs_stability=False)
 
-            # A point on either side, in the range, and one at the end of a shoulder, where another peak may be higher
+            # A point beside it in the range, and one at the end of a shoulder, where another peak may be higher
             points.append(top)
             sides = (slice(k, None), slice(k, None, -1))
             spans = [np.abs(omega[side] - omega[k]) for side in sides]
             widths = [measure_peak_width(heights[side], span) for side, span in zip(sides, spans)]
-            narrow = min(filter(None, widths))
-            self.estimated_width = narrow
-            for width, direction in zip(widths, (1, -1)):
-                steps = [min(SIDE_POINT_FRACTION * narrow, width)] * (width > 0)
-                steps += [width] * (width > SHOULDER_RATIO * narrow)
-                for step in steps:
-                    beside = replace(sine, omega=float(omega[k] + direction * step))
-                    start = top.guess.start
-                    points.append(self.compute_curve_point(beside, start, needs_stability=False))
+            self.estimated_width = min(filter(None, widths))
+            wide = max(widths)
+            steps = [SIDE_POINT_FRACTION * self.estimated_width]
+            steps += [wide] * (wide > SHOULDER_RATIO * self.estimated_width)
+            for step in steps if widths[0] == wide else [-step for step in steps]:
+                beside = replace(sine, omega=float(omega[k] + step))
+                start = top.guess.start
+                points.append(self.compute_curve_point(beside, start, needs_stability=False))
         return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
 
     def _follow_curve(self, drive) -> ResponseCurve:
@@ -516,7 +538,7 @@ class ShootingFinder:
                 "accuracy.method: the motion at the first frequency of the sweep grows for ever; change drive.from"
             )
         self._equations = MotionCurve(
-            lambda omega: self.make_case(replace(first, omega=omega)),
+            self._vary(first, lambda omega: replace(first, omega=omega)),
             motion.run.final,
             first.omega,
             has_kinks=self.joints.has_kinks,
@@ -525,7 +547,7 @@ class ShootingFinder:
         bounds = (float(ends.min()), float(ends.max()))
         path = self._equations.follow(bounds, FREQUENCY_PATH, forward=drive.high > drive.low)
         points = [self._describe_path_point(point) for point in path.points]
-        folds = tuple(fold / (2 * np.pi) for fold in path.folds)
+        folds = np.array([path.folds, path.fold_errors]) / (2 * np.pi)
         return ResponseCurve(
             points, folds, tuple(note_end_of_curve(points, path.ended, drive.high))
         )
@@ -642,9 +664,7 @@ def find_relative_error(motion: periodic.PeriodicMotion) -> float:
     return motion.error + STEPS_ERROR * RTOL
 
 
-def solve_steady_motion(
-    model, numerics, patch, frames: int = 0, say=None, progress=None
-) -> Solution:
+def solve_steady_motion(model, numerics, patch, frames: int = 0, say=None) -> Solution:
     """Compute the steady motion under a sine, or the largest one over a sweep.
 
     The drive of the largest motion is `Solution.drive`.
@@ -659,8 +679,8 @@ def solve_steady_motion(
         None under [normal] and between masses.
     frames : int
         Number of snapshots of the interface in a cycle.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction; progress is not used.
+    say : callable, optional
+        Callback for a line of text.
 
     Returns
     -------
