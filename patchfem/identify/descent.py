@@ -198,16 +198,16 @@ class LinearModel:
     Parameters
     ----------
     model : UnitCubeResidual
-    u : (n,) array
-        Point at which the residual is known.
+    point : (n,) array
+        Point u at which the residual is known.
     free : sequence of int
         Indices of the f coordinates that move.
     """
 
-    def __init__(self, model: UnitCubeResidual, u: np.ndarray, free: Sequence[int]):
+    def __init__(self, model: UnitCubeResidual, point: np.ndarray, free: Sequence[int]):
         self.model = model
         self.free = list(free)
-        self.u = np.array(u, float)
+        self.u = np.array(point, float)
         self.residual = model(self.u)
         self.is_fresh = False
         self.differentiate()
