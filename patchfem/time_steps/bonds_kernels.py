@@ -6,14 +6,16 @@ eps_0 g(v)/g(0), with Stribeck's curve g at the mean speed of the step, and the 
 constant load it stores the energy of its mean deflection z/m; only that of its bonds cannot rise as a load changes.
 """
 
-from math import exp
+from math import exp, sqrt
 
 from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_NO_REFCOUNT
 from ..compiled.jit import njit
 from ..friction.bonds.point_kernels import (
     MAX_SERIES_PATH,
+    BondMoments,
     bond_mean,
     bond_step,
+    find_cut,
     grow,
     press_point,
     shape_functions,
@@ -110,7 +112,8 @@ def prepare_bonds(numbers, memory, trial, values, count, step):
     for j in range(count):
         start = values[Value.START_LOAD + j]
         middle = 0.5 * (start + values[Value.END_LOAD + j])
-        if start != middle and numbers[BondRow.IS_KEPT + j] == 0:
+        is_pressed = start != middle and numbers[BondRow.IS_KEPT + j] == 0
+        if middle > start and is_pressed:
             press_bonds(numbers, trial, j, start, middle)
         if numbers[BondRow.SPEED + j] > 0:
             speed = values[Value.START_VELOCITY + j]
@@ -122,6 +125,48 @@ def prepare_bonds(numbers, memory, trial, values, count, step):
             v = values[Value.START_VELOCITY + j]
             growth = numbers[BondRow.GROWTH + j : BondRow.INITIAL : WIDTH]
             trial[j] = grow(memory[j], v, v, abs(v) * half, half, growth).length
+        if middle < start and is_pressed:
+            release_bonds(numbers, trial, values, j)
+        # `finish_bonds` reads the stretch before the slide here.
+        values[Value.END_BY_VELOCITY + j] = trial[2 * WIDTH + j]
+
+
+@njit(**NJIT_CALL)
+def release_bonds(numbers, trial, values, j):
+    """Let the first half of a fall of the load of point j act: m falls, and z and s2 by half of what the step cuts.
+
+    What the whole step cuts is found by its slide. It is not what half of the fall would cut at rest, because bonds that
+    form on the slide take over, as after a reversal in full slip.
+
+    Parameters
+    ----------
+    numbers, trial, values : array
+        Numbers of the law, bond lengths and moments of the block, which are changed, and its values.
+    j : int
+        Number of the point.
+    """
+    start = values[Value.START_LOAD + j]
+    stop = values[Value.END_LOAD + j]
+    middle = 0.5 * (start + stop)
+    slide = values[Value.SLIDE + j]
+    m = trial[WIDTH + j] * middle / start
+    z = trial[2 * WIDTH + j]
+    s2 = trial[3 * WIDTH + j]
+    shapes = shape_functions(abs(slide) / trial[j])
+    moved = bond_step((m, z, s2), slide, middle, trial[j], shapes)
+    end = BondMoments(moved.m * stop / middle, moved.z, moved.s2)
+    cut = sqrt(find_cut(end, numbers[BondRow.LENGTH + j] * stop))
+    z *= cut
+    s2 *= cut
+
+    # On the way back over the stretch, s2 + 2 z u + m u^2 >= 0 of a slide u would fail for fewer bonds m: a long slide
+    # under a jump of the load would create energy.
+    if slide * z < 0:
+        back = min(abs(slide), s2 / abs(z))
+        m = max(m, (2 * abs(z) - s2 / back) / back)
+    trial[WIDTH + j] = m
+    trial[2 * WIDTH + j] = z
+    trial[3 * WIDTH + j] = s2
 
 
 @njit(**NJIT_CALL)
@@ -176,15 +221,7 @@ def finish_bonds(numbers, memory, trial, values, count, step):
             if step.duration > 0 and damping + viscous > 0:
                 m = 0.5 * (memory[WIDTH + j] + trial[WIDTH + j])
                 # The bonds are damped as the slide stretches them, not as a change of load breaks them.
-                first = memory[2 * WIDTH + j]
-                if numbers[BondRow.IS_KEPT + j] == 0:
-                    first = press_point(
-                        (memory[WIDTH + j], first, memory[3 * WIDTH + j]),
-                        values[Value.START_LOAD + j],
-                        middle,
-                        numbers[BondRow.INITIAL + j],
-                        numbers[BondRow.LENGTH + j],
-                    ).z
+                first = values[Value.END_BY_VELOCITY + j]
                 values[Value.MEAN + j] += damping * (z - first) / step.duration
                 values[Value.MEAN + j] += viscous * middle * slide / step.duration
                 values[Value.MEAN_BY_SLIDE + j] += (damping * m + viscous * middle) / step.duration

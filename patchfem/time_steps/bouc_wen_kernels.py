@@ -9,12 +9,63 @@ from math import exp, sqrt
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from ..friction.laws.bouc_wen_kernels import follow_path
+from ..friction.laws.bouc_wen_kernels import COARSE_PIECES, FollowedPath, follow_path
 from .step_rows_kernels import WIDTH, Value
 
 # Relaxation over a step below which the first term of a series is exact to 1e-6
 MIN_RELAXATION = 1e-3
 MIN_PATH = 1e-9  # path in lengths below which the slope of the mean is half of that at the end
+
+
+@njit(**NJIT_CALL)
+def find_slip(y, exponent, shape):
+    """Return the fraction of a slide that slips, 1 - dy/dx.
+
+    Parameters
+    ----------
+    y : float
+        Force over the limit in the direction of motion; taken as -1 or 1 beyond them.
+    exponent, shape : float
+        Numbers of the law.
+    """
+    size = min(abs(y), 1.0) ** exponent
+    return size if y > 0 else (1 - 2 * shape) * size
+
+
+@njit(**NJIT_CALL)
+def break_springs(springs, load, slip):
+    """Return the load of the springs [N] after a slip; those beyond the load break by an exponential of order 2.
+
+    Parameters
+    ----------
+    springs, load : float
+        Load of the springs, and of the point [N].
+    slip : float
+        Slip in lengths; below 0 it breaks none.
+    """
+    slip = max(slip, 0.0)
+    return load + (springs - load) / (1 + slip * (1 + 0.5 * slip))
+
+
+@njit(**NJIT_CALL)
+def find_start(force, move, load, middle):
+    """Return the force y [N] in the direction of motion after the first half of a change of load.
+
+    Half of what the whole step cuts is cut before the slide, as a factor.
+
+    Parameters
+    ----------
+    force : float
+        y in the direction of motion at the start [N].
+    move : float
+        Change of y [N] along the slide by the springs.
+    load, middle : float
+        Load at the end of the step, and its mean [N].
+    """
+    if force >= 0:
+        return min(force, middle)
+    rest = -force - move
+    return force * sqrt(max(load, 0.0) / rest) if rest > load else force
 
 
 @njit(**NJIT_CALL)
@@ -39,23 +90,27 @@ def slide_bouc_wen(numbers, memory, trial, values, count, step):
             values[Value.ENERGY + j] = values[Value.STRETCH + j] = 0.0
             continue
 
-        # The first half of the change of load cuts the force and adds springs; the path is under the mean load.
-        start = min(max(memory[j], -middle), middle)
-        springs = max(memory[WIDTH + j], middle)
-        energy = 0.5 * length * start * start / springs
+        # The first half of the change of load adds springs, and cuts a force that grows along the path. One that the path
+        # reduces faster than the load falls is never cut, so that its part beyond the limit is carried along.
         direction = 1.0 if slide > 0 else -1.0
+        first_springs = max(memory[WIDTH + j], middle)
+        slips = find_slip(direction * memory[j] / middle, exponent, numbers[3 * WIDTH + j])
+        springs = break_springs(first_springs, middle, 0.5 * slips * abs(slide) / length)
         path = abs(slide) * springs / (length * middle)
-        y = direction * start / middle
-        moved = follow_path(y, path, exponent, numbers[3 * WIDTH + j])
-        mean = moved.mean if path > 0 else y
+        unloading = 2 * numbers[3 * WIDTH + j] * path * middle  # of a force at its limit
+        start = find_start(direction * memory[j], unloading, load, middle)
+        y = max(start / middle, -1.0)
+        beyond = (start / middle - y) * exp(-path)
+        energy = 0.5 * length * start * start / first_springs
+        moved = follow_path(y, path, exponent, numbers[3 * WIDTH + j], COARSE_PIECES)
+        slipped = max(path - (moved.end - y), 0.0) * middle / springs
+        moved = FollowedPath(moved.end + beyond, moved.mean + beyond)
+        mean = moved.mean if path > 0 else start / middle
         work = energy + middle * mean * abs(slide)
-        size = abs(moved.end) ** exponent
-        rate = (1 - size if moved.end > 0 else 1 - (1 - 2 * numbers[3 * WIDTH + j]) * size) / length
-        rate *= springs
+        rate = springs / length * (1 - find_slip(moved.end, exponent, numbers[3 * WIDTH + j]))
 
         # Springs beyond the load break over the part of the path that slips.
-        slipped = max(path - (moved.end - y), 0.0) * middle / springs
-        left = middle + (springs - middle) / (1 + slipped * (1 + 0.5 * slipped))
+        left = break_springs(first_springs, middle, slipped)
         left = max(left, load) if load > 0 else 0.0
 
         # Second half of the change of load

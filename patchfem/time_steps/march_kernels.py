@@ -835,9 +835,14 @@ def release_port(system, drive, is_last):
     """
     points = system.points
     ports = system.ports
-    # Row 2 of the state is that at the end of the trial step.
+    # Row 2 of the state is that at the end of the trial step, and so are the forces of the points.
     for p in range(ports.values.shape[1]):
-        ports.vector[p] = sum_forces(system, p)
+        ports.vector[p] = 0.0
+        for block in range(points.first[p], points.first[p + 1]):
+            if points.law[block] == Law.COULOMB:
+                ports.vector[p] += find_rigid_force(points, block)
+            else:
+                ports.vector[p] += sum_points(points, block, Value.END)
     normal.find_holds(system, system.state[2], drive)
     worst = -1
     largest = 1.0
@@ -856,6 +861,14 @@ def release_port(system, drive, is_last):
     if is_last:
         points.trial[points.first[worst], 0] = np.sign(ports.values[Port.HOLD, worst])
     return not is_last
+
+
+@njit(**NJIT_CALL)
+def find_rigid_force(points, block):
+    """Return the friction [N] of the rigid point of a block at the end of a trial step, 0 at rest."""
+    direction = points.trial[block, 0]
+    load = pick_load(points.values[block], Value.END_LOAD, direction)
+    return points.numbers[block, WIDTH] * load * direction
 
 
 @njit(**NJIT_CALL)
@@ -889,8 +902,7 @@ def commit(system, duration):
             moves[Port.RETURN, p] = moves[Port.INCREMENT, p] if was_held else 0.0
             values[Value.SLIDE] = moves[Port.INCREMENT, p] - moves[Port.RETURN, p]
             rest += moves[Port.FORCE, p] * moves[Port.RETURN, p]
-            load = pick_load(values, Value.END_LOAD, points.trial[block, 0])
-            values[Value.END] = points.numbers[block, WIDTH] * load * points.trial[block, 0]
+            values[Value.END] = find_rigid_force(points, block)
         elif points.law[block] == Law.LIST:
             numbers = points.numbers[block]
             lists.advance_lists(system.lists, numbers, values, points.count[block], duration)

@@ -228,15 +228,27 @@ def press_point(bonds, s0, s1, initial, length):
     if s1 >= s0:
         return BondMoments(m + initial * (s1 - s0), z, s2)
 
-    # m falls in proportion to the load. The bonds that formed last, without stretch, are released first, so that z and s2
-    # stay. By the Cauchy-Schwarz inequality no bonds have m < z^2/s2. Beyond that z and s2 fall by the same factor, so that
-    # z^2/s2 falls to the remaining m.
+    # m falls in proportion to the load, and z and s2 stay as long as the remaining bonds can carry them.
     remaining = m * s1 / s0
-    min_density = z * z / s2 if s2 > 0 else 0.0
-    factor = remaining / min_density if min_density > remaining else 1.0
-
-    # The force mu_s z/eps_0 may not exceed the new limit mu_s s1
-    bound = length * s1
-    if factor * abs(z) > bound:
-        factor = bound / abs(z)
+    factor = find_cut(BondMoments(remaining, z, s2), length * s1)
     return BondMoments(remaining, z * factor, s2 * factor)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def find_cut(bonds, bound):
+    """Return the factor, at most 1, of z and s2 by which bonds lose stretch as the load of a point falls.
+
+    The bonds that formed last, without stretch, are released first. By the Cauchy-Schwarz inequality no bonds have
+    m < z^2/s2. Beyond that z and s2 fall by the same factor, so that z^2/s2 falls to m. The force mu_s z/eps_0 may not
+    exceed the limit either.
+
+    Parameters
+    ----------
+    bonds : BondMoments
+        m [N] under the new load, z [N m] and s2 [N m2].
+    bound : float
+        Largest z, the bond length eps_0 times the new load [N m].
+    """
+    min_density = bonds.z * bonds.z / bonds.s2 if bonds.s2 > 0 else 0.0
+    factor = bonds.m / min_density if min_density > bonds.m else 1.0
+    return bound / abs(bonds.z) if factor * abs(bonds.z) > bound else factor
