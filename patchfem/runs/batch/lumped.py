@@ -79,6 +79,7 @@ MAX_STICKING_SLIP_RATIO = 1e-3
 MAX_MICRO_DAMPING_RATIO = 4.0
 # Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
 MEASURE_CHANGE_ROUND_OFF = 1e-12
+DRIFT = "drift_per_cycle"  # name of the measure, which is the difference of two cycles
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 CREEP_KEY = "friction.reference_speed"  # key on which the note on creep depends
 
@@ -350,7 +351,8 @@ def estimate_errors(
         for name, part in zip(names, pooled * is_changed):
             errors[name] += part * sizes[name]
         for name, error in errors.items():
-            errors[name] = combine_errors(name, fine, [error], repeat_error)
+            left_out = march.repeat if name == DRIFT else repeat_error
+            errors[name] = combine_errors(name, fine, [error], left_out)
         return errors
 
 
@@ -378,7 +380,9 @@ def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarra
     errors = {}
     for name in values:
         round_off = EXACT_ROUND_OFF * find_size(name, values)
-        errors[name] = combine_errors(name, values, [round_off], repeat_error)
+        # A drift is the difference of two cycles.
+        left_out = march.repeat if name == DRIFT else repeat_error
+        errors[name] = combine_errors(name, values, [round_off], left_out)
 
     slide = values[AMPLITUDE] / np.abs(group.read(Number.OUTPUT))
     difference = np.where(values["slip_amplitude"] > 0, repeat_error, march.repeat)
