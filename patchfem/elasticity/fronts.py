@@ -226,9 +226,8 @@ class _Elimination:
             cut = np.partition(along, members.size // 2)[members.size // 2]
             is_first = along < cut if (along < cut).any() else along <= cut
             terms = [self.condense(members[is_first]), self.condense(members[~is_first])]
-            nodes, counts = (
-                np.concatenate(values) for values in zip(*(term[:2] for term in terms))
-            )
+            nodes = np.concatenate([term.nodes for term in terms])
+            counts = np.concatenate([term.counts for term in terms])
             add_terms = _add_stiffnesses
         else:
             terms = StiffCells(self.cells.nodes[members], self.cells.matrices[members])

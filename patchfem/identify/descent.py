@@ -29,7 +29,8 @@ FIRST_TRUST = 0.3  # largest change of a parameter in the first step, relative t
 MIN_DECREASE_RATIO = 0.25
 # Ratio of this kind below which the Jacobian of an expensive residual is computed again
 MIN_SECANT_RATIO = 0.5
-# Largest distance of a point from a known minimum that a descent has reached, relative to the ranges
+# Largest distance of a point from a known minimum that a descent has reached, relative to the ranges, and largest relative
+# difference of the sums of squares
 SAME_POINT_DISTANCE = 0.02
 
 
@@ -143,20 +144,22 @@ class UnitCubeResidual:
 
     def _evaluate(self, u: tuple[float, ...]) -> np.ndarray | None:
         """Evaluate the residual at u (n,), and count evaluations and failures."""
-        count, failures, first_reason = self.counts
+        counts = self.counts
+        self.counts = counts._replace(evaluations=counts.evaluations + 1)
         reason = "the residual is not finite"
         try:
             residual = np.asarray(self.residual(self.space.to_values(u)), float)
             if np.isfinite(residual).all():
                 self.rows = residual.size
                 self.largest = max(self.largest, np.abs(residual).max(initial=0.0))
-                self.counts = SearchCounts(count + 1, failures, first_reason)
                 return residual
         except Missing:
             raise
         except (PatchfemError, ArithmeticError, np.linalg.LinAlgError) as error:
             reason = str(error)
-        self.counts = SearchCounts(count + 1, failures + 1, first_reason or reason)
+        self.counts = self.counts._replace(
+            failures=counts.failures + 1, reason=counts.reason or reason
+        )
         return None
 
     def jacobian(self, u, free: Sequence[int]) -> np.ndarray:
@@ -195,16 +198,16 @@ class LinearModel:
     Parameters
     ----------
     model : UnitCubeResidual
-    u : (n,) array
-        Point at which the residual is known.
+    point : (n,) array
+        Point u at which the residual is known.
     free : sequence of int
         Indices of the f coordinates that move.
     """
 
-    def __init__(self, model: UnitCubeResidual, u: np.ndarray, free: Sequence[int]):
+    def __init__(self, model: UnitCubeResidual, point: np.ndarray, free: Sequence[int]):
         self.model = model
         self.free = list(free)
-        self.u = np.array(u, float)
+        self.u = np.array(point, float)
         self.residual = model(self.u)
         self.is_fresh = False
         self.differentiate()
@@ -300,9 +303,10 @@ def descend(model: UnitCubeResidual, u, known: Sequence[Descent] = ()) -> Descen
         point = linear.propose(found.x)
         expected = linear.cost - predicted
         size = np.abs(point - linear.u).max()
-        reached = _find_known(known, point, predicted) if size < trust else None
-        if reached is not None:
-            return reached
+        for end in known if size < trust else ():
+            distance = np.abs([*(end.u - point), end.cost / max(predicted, 1e-300) - 1]).max()
+            if end.is_converged and distance <= SAME_POINT_DISTANCE:
+                return end
         if linear.cost <= model.floor or expected <= tolerance * linear.cost or size < STEP_TOL:
             is_converged = bool(np.isfinite(linear.jacobian).all())
             if linear.is_fresh or linear.cost <= model.floor:
@@ -328,16 +332,3 @@ def descend(model: UnitCubeResidual, u, known: Sequence[Descent] = ()) -> Descen
         if ratio < MIN_SECANT_RATIO:
             linear.differentiate()
     return Descent(linear.u, linear.cost, is_converged, model.rows)
-
-
-def _find_known(known: Sequence[Descent], point: np.ndarray, cost: float) -> Descent | None:
-    """Return the known minimum near a point (n,) whose sum of squares is `cost` or little more; None if there is none."""
-    for end in known:
-        is_near = np.abs(end.u - point).max() <= SAME_POINT_DISTANCE
-        if (
-            is_near
-            and end.is_converged
-            and abs(end.cost / max(cost, 1e-300) - 1) <= SAME_POINT_DISTANCE
-        ):
-            return end
-    return None

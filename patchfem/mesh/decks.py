@@ -125,9 +125,11 @@ class Deck:
 
         # Line elements, sets of nodes and sides of cells tag edges, by their nodes
         cells = {}
-        edges = {
-            tag: [*self.sets["NSET"].get(tag, ()), *self._list_side_nodes(tag)] for tag in EDGE_TAGS
-        }
+        edges = {}
+        for tag in EDGE_TAGS:
+            nodes = [*self.sets["NSET"].get(tag, ()), *self._list_side_nodes(tag)]
+            if nodes:
+                edges[tag] = nodes
         for number, (kind, nodes) in self.elements.items():
             tag = tags.get(number, "")
             if kind in ELEMENTS:
@@ -138,16 +140,12 @@ class Deck:
         # Node numbers become positions in the array of points
         position = {number: k for k, number in enumerate(self.nodes)}
         try:
-            groups = {}
             for kind, members in cells.items():
                 nodes, names = zip(*members)
                 rows = [[position[node] for node in cell] for cell in nodes]
-                groups[kind] = TaggedCells(np.array(rows, np.int64), np.array(names, str))
-            edges = {
-                tag: np.array([position[node] for node in nodes])
-                for tag, nodes in edges.items()
-                if nodes
-            }
+                cells[kind] = TaggedCells(np.array(rows, np.int64), np.array(names, str))
+            for tag, nodes in edges.items():
+                edges[tag] = np.array([position[node] for node in nodes])
         except KeyError as error:
             raise PatchfemError(
                 f"an element or a set names node {error}, which the file does not define"
@@ -156,7 +154,7 @@ class Deck:
         if len({len(coordinates) for coordinates in self.nodes.values()}) > 1:
             raise PatchfemError("either all nodes need two coordinates, or all nodes need three")
         points = np.array(list(self.nodes.values()), float).reshape(len(self.nodes), -1)
-        return TaggedMesh(points, groups, edges, DECK_TAG_HELP)
+        return TaggedMesh(points, cells, edges, DECK_TAG_HELP)
 
     def _list_side_nodes(self, tag: str) -> list[int]:
         """Return both corner nodes of each element side in the surface with the name `tag`."""

@@ -111,10 +111,10 @@ def join_meshes(lower_piece, upper_piece) -> tuple[np.ndarray, dict[str, TaggedC
 
 def _join_cells(parts_by_kind: dict[str, list]) -> dict[str, TaggedCells]:
     """Join parts of cells, each nodes (t, k) and names (t,), by the name of their element."""
-    return {
-        kind: TaggedCells(*map(np.concatenate, zip(*parts)))
-        for kind, parts in parts_by_kind.items()
-    }
+    joined = {}
+    for kind, parts in parts_by_kind.items():
+        joined[kind] = TaggedCells(*map(np.concatenate, zip(*parts)))
+    return joined
 
 
 def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:

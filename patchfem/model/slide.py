@@ -1,5 +1,7 @@
 """What a scene prescribes at a contact: the slide of a bench with its samples, the normal load, and grooves."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from math import ceil, sqrt
 from pathlib import Path
@@ -7,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import inputs
+from .. import friction, inputs
 from ..core import Missing, array_dataclass
-from ..friction import grooves
 from ..scene.rules.methods import find_climbed_grooves
 from .source import cache_by_file, name_key
 
@@ -347,13 +348,15 @@ class PointLoad:
         return (np.concatenate([part.ravel() for part in parts]) - lag) * period
 
 
-def build_grooves(scene) -> grooves.Grooves | None:
+def build_grooves(scene) -> friction.grooves.Grooves | None:
     """Build the grooves of [contact] or [normal] in a scene, or None if there are none or they are flat."""
     key = find_climbed_grooves(scene).strip("[]")
     if not key:
         return None
     keys = getattr(scene, key.partition(".")[0]).grooves
-    return grooves.Grooves(keys.wavelength, keys.amplitude, keys.phase, keys.lifted_mass, key)
+    return friction.grooves.Grooves(
+        keys.wavelength, keys.amplitude, keys.phase, keys.lifted_mass, key
+    )
 
 
 def build_point_load(scene, rig=None) -> PointLoad | None:

@@ -302,6 +302,7 @@ WIDTH_HEIGHT_FRACTION = 0.9  # Fraction of the height of a peak at which its wid
 # measured a tenth below the peak, so that an error of a tenth shifts it by its width.
 ERROR_SHIFT_FACTOR = 10.0
 HALF_POWER = 2.0  # inverse square of the amplitude at half the power, relative to the peak
+MAX_HALF_POWER_POINTS = 4  # largest number of points that are added at each half-power point
 NO_WIDTH_REASON = "the curve does not fall to half the power on both sides of its peak"
 SHIFT_SAFETY_FACTOR = 2.0  # error of the position of a peak, relative to its last shift
 # Relative rise of a peak over a point at the distance of its width
@@ -339,7 +340,7 @@ def refine_peak(points: list[CurvePoint], finder, tolerance: float) -> RefinedPe
         Points of the curve in order: two at least.
     finder
         Has the methods measure_curve_distance(a, b), measure_missing_ends(points) and
-        compute_point_between(a, b, fraction) of CurvePoints.
+        compute_point_between(a, b, fraction) of CurvePoints; of a curve that it draws, the half-power points are refined.
     tolerance : float
         Relative tolerance of the scene.
 
@@ -357,6 +358,9 @@ def refine_peak(points: list[CurvePoint], finder, tolerance: float) -> RefinedPe
     for place in np.array(curve.positions)[high[is_maximum]].tolist():
         shift = curve.refine_maximum(place, max(POSITION_TOL * tolerance, MIN_POSITION_TOL))
         shifts[shift.position] = shift
+
+    if finder.draws_curve:
+        curve.refine_half_power_points(max(POSITION_TOL * tolerance, MIN_POSITION_TOL))
 
     # A curve that rises up to its end has its largest motion there.
     best = find_largest_point(curve.points)
@@ -475,6 +479,26 @@ class CurveInProgress:
             heights = self.find_heights()[first : k + 3]
             k = first + int(heights.argmax())
         return self.find_widest_shift(k)
+
+    def refine_half_power_points(self, tolerance: float) -> None:
+        """Add points where the curve falls to half the power of its peak, until they stay within a part of the width [1]."""
+        for direction in (-1, 1):
+            for _ in range(MAX_HALF_POWER_POINTS):
+                top = int(self.find_heights().argmax())
+                heights = np.nan_to_num(_collect_amplitudes(self.points))
+                x = np.array(self.positions)[top::direction]
+                low = np.flatnonzero(heights[top::direction] < heights[top] / np.sqrt(HALF_POWER))
+                near = slice(low[0] - 1, low[0] + 1) if low.size else slice(0)
+                y = heights[top::direction][near]
+                if y.size < 2 or not (y > 0).all():
+                    break
+                place = float(np.interp(HALF_POWER, (heights[top] / y) ** 2, x[near]))
+                if np.abs(x[near] - place).min() <= tolerance * abs(place - x[0]):
+                    break
+                try:
+                    self._add_point(place)
+                except NotConverged:
+                    break
 
     def _find_place_outside(self, k: int) -> float | None:
         """Return the next position beyond an end of the curve if the highest point `k` is there and the curve goes on.
