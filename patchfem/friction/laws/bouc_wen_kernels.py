@@ -30,7 +30,9 @@ class Pieces(NamedTuple):
 
 
 FINE_PIECES = Pieces(0.03125, 1e-8, 0.25)  # error 4e-9 of the limit over a half cycle
-COARSE_PIECES = Pieces(0.125, 1e-4, 0.5)  # error 4e-7, below that of time steps; a fourth of the time
+COARSE_PIECES = Pieces(
+    0.125, 1e-4, 0.5
+)  # error 4e-7, below that of time steps; a fourth of the time
 
 
 class FollowedPath(NamedTuple):
