@@ -670,7 +670,7 @@ def sweep(
 
 
 class SweepPlots:
-    """Plots of sweeps and of backbone curves as matplotlib Axes.
+    """Plots of sweeps, of backbone curves and of results folders as matplotlib Axes.
 
     The instance `patchfem.plot` is used as in ``pf.plot.sweep(dataset, "loop_area")``.
     """
@@ -738,6 +738,43 @@ class SweepPlots:
         >>> pf.plot.backbone(curves).figure.savefig("backbone.png")
         """
         return backbones.draw_backbone(dataset, ax)
+
+    @staticmethod
+    def folder(folder: str | Path, title: str = "", ax: Axes | None = None) -> Axes:
+        """Plot charts of the page of a results folder, which any command has written.
+
+        Parameters
+        ----------
+        folder : path
+            Results folder.
+        title : str
+            Title of the chart on the page. Default: all charts.
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw the first chart on. Default: a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Axes of the first chart.
+
+        Raises
+        ------
+        PatchfemError
+            If the folder has no results, or no chart with this title.
+
+        Examples
+        --------
+        >>> import patchfem as pf
+        >>> folder = pf.run(pf.new("bench")).save("bench")
+        >>> pf.plot.folder(folder, "Energy").figure.savefig("energy.png")
+        """
+        answer = store.read_answer(_require_path(folder, "plot.folder"))
+        titles = chart_axes.list_titles(answer)
+        if not titles or title not in ("", *titles):
+            raise PatchfemError(
+                f"plot.folder: {folder} has no chart {title!r}; its charts are {', '.join(titles) or 'none'}"
+            )
+        return chart_axes.draw_charts(answer, (title,) if title else (), ax, "plot.folder")
 
 
 plot = SweepPlots()
@@ -1471,6 +1508,28 @@ class Plots:
         titles = ("Levels of the drive", "Steady motions")
         return self._draw(ax, "levels", titles, self._explain_missing_motion() or no_levels)
 
+    def curve(self, ax: Axes | None = None) -> Axes:
+        """Plot the response curve: amplitude and acceleration of the steady motions against frequency or level.
+
+        With `ax`, only the amplitude is drawn.
+        """
+        no_curve = 'the run has no response curve; use drive.waveform = "sweep" with accuracy.method = "harmonic"'
+        reason = self._explain_missing_motion() or no_curve
+        return self._draw(ax, "curve", ("Steady motions",), reason)
+
+    @property
+    def charts(self) -> list[str]:
+        """Titles of the charts that the page of this run shows."""
+        return chart_axes.list_titles(runs.make_run_answer(self._result))
+
+    def chart(self, title: str, ax: Axes | None = None) -> Axes:
+        """Plot a chart of the page by its title, one of `charts`.
+
+        It is drawn on `ax`, by default on a new figure.
+        """
+        reason = f"the charts of this run are {', '.join(self.charts) or 'none'}"
+        return self._draw(ax, f"chart {title!r}", (title,), reason)
+
     def accuracy(self, ax: Axes | None = None) -> Axes:
         """Plot the largest error of the motion against CPU time, for different numbers of time steps.
 
@@ -1548,7 +1607,7 @@ class Result(run_result.Result):
 
     @property
     def plot(self) -> Plots:
-        """Plots of the run: pressure(), stress(), loop(), history(), levels(), accuracy()."""
+        """Plots of the run: pressure(), stress(), loop(), history(), curve(), levels(), accuracy(), and chart() by title."""
         return Plots(self)
 
     def table(self) -> DataFrame:

@@ -11,10 +11,13 @@ Signs: compression, normal stress and load are positive; relative displacement i
 rotation opens the gap at +x.
 """
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, NamedTuple
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple, dataclass_transform
 
 import numpy as np
 
@@ -39,8 +42,11 @@ __all__ = [
     "Response",
     "SineDrive",
     "add_interface_number",
+    "array_dataclass",
     "compute_allowed_error",
     "frozen_array",
+    "max_abs",
+    "read_measure_rows",
     "remove_interface_number",
 ]
 
@@ -52,6 +58,12 @@ _STIFFENING_ROUND_OFF = 1e-9
 _ZERO_OVERLAP = 1e-30
 # assignment cost of a forbidden pair of modes, larger than that of any allowed assignment
 _FORBIDDEN_PAIR_COST = 1e6
+
+
+@dataclass_transform(eq_default=False, frozen_default=True)
+def array_dataclass(cls: type) -> type:
+    """Make a class a record of arrays: a dataclass that is immutable, has slots, and equals only itself."""
+    return dataclass(frozen=True, eq=False, slots=True)(cls)
 
 
 class Outcome(StrEnum):
@@ -97,6 +109,11 @@ _OUTCOME_SENTENCES = {
 }
 
 
+def max_abs(values) -> float:
+    """Return the largest magnitude of numbers in an array of any shape; 0 if it is empty."""
+    return float(np.abs(values).max(initial=0.0))
+
+
 def frozen_array(values, dtype=np.float64) -> np.ndarray:
     """Return a read-only, C-ordered copy of values as an array of this dtype."""
     out = np.array(values, dtype=dtype, order="C")
@@ -104,7 +121,7 @@ def frozen_array(values, dtype=np.float64) -> np.ndarray:
     return out
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Interface:
     """Nodes of the interface of a patch along the sliding direction.
 
@@ -123,7 +140,7 @@ class Interface:
         return float(self.x[-1] - self.x[0])
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Compliance:
     """Elastic compliance matrices of both pieces, condensed to the interface nodes.
 
@@ -140,7 +157,7 @@ class Compliance:
     tangential: np.ndarray
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class ContactState:
     """Solution of a static normal contact problem.
 
@@ -173,7 +190,7 @@ class StuckMode(NamedTuple):
     shape: np.ndarray
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class ModalBasis:
     """Modal coordinates of a rig (natural modes or masses) with a common modal mass.
 
@@ -277,7 +294,7 @@ def _assign_modes(lower, values, overlap) -> np.ndarray:
     return linear_sum_assignment(cost)[1]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class InitialState:
     """State of a rig at time t = 0.
 
@@ -289,7 +306,7 @@ class InitialState:
     v: np.ndarray
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class DriveSegment:
     """Segment of a drive signal in closed form: a constant plus a sinusoid.
 
@@ -309,7 +326,7 @@ class DriveSegment:
     phase: float = 0.0
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class SineDrive:
     """Sinusoidal drive a sin(omega t) for t >= 0.
 
@@ -341,7 +358,7 @@ class SineDrive:
         return self.acceleration * np.sin(self.omega * np.asarray(t, float))
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Measure:
     """Computed quantity of a run with its unit and its numerical error.
 
@@ -415,19 +432,19 @@ class MeasureDefinition(NamedTuple):
       name; None if only an engine or another kind of run computes it.
     - sample_error: error due to sampling, multiplied by the number of samples per cycle.
     - group: group of related measures: motion, friction, energy, patch or wear.
-    - larger_term: for a measure that is a small difference of larger terms, the name of these terms and a function that
-      returns their size from the measures of the same interface; otherwise None. The tolerance times this size is added
-      to the floor.
+    - larger_term: for a measure that is a small difference of larger terms, the name of these terms; otherwise "". The
+      tolerance times their size (`response.rows.find_larger_term`) is added to the floor.
     - order: order of the sampling error of an exact motion in the sample spacing.
     - minimum: smallest possible value.
     - flags: sets to which the measure belongs, separated by blanks: "main" (the tolerance of a run applies to it),
       "interface" (one value per interface), "level" (one value per drive level), "curve" (a column of a response
       curve), "mesh" (its error controls the mesh), "displacement" (its floor is limited by the displacement of the
       drive), "force" (its floor is limited by the normal load), "error" (it is itself an error), "sine" (it exists only
-      under a sine), "loop" (an integral or a peak of samples of the friction loop), "run" (a sum over the whole run),
-      "phase" (an angle modulo pi).
-    - friction_scale: function of an `errors.FrictionScale` that returns the error of the measure for a relative error 1
-      of the friction force; None if this is the value of the measure.
+      under a sine), "cycle" (a mean over whole cycles of a sine),
+      "loop" (an integral or a peak of samples of the friction loop), "run" (a sum over the whole run),
+      "phase" (an angle modulo pi), "scatter" (a statistical mean under a random drive).
+    - friction_scale: name of the size in `response.errors.compute_friction_errors` that is the error of the measure for a
+      relative error 1 of the friction force; "" if this is the value of the measure.
     """
 
     name: str
@@ -437,18 +454,30 @@ class MeasureDefinition(NamedTuple):
     function: Callable[[Any], float | None] | str | None = None
     sample_error: float = 0.0
     group: str = "motion"
-    larger_term: tuple[str, Callable] | None = None
+    larger_term: str = ""
     order: float = 1.0
     minimum: float = -np.inf
     flags: str = ""
-    friction_scale: Callable | None = None
+    friction_scale: str = ""
 
     def has(self, flag: str) -> bool:
         """Return whether a flag is among those of the measure."""
         return flag in self.flags.split()
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+def read_measure_rows(table: str) -> dict[str, MeasureDefinition]:
+    """Read a table of measures.toml, "motion", "internal" or "patch", as MeasureDefinitions by name."""
+    rows = _read_measure_tables()[table].items()
+    return {name: MeasureDefinition(name, **row) for name, row in rows}
+
+
+@cache
+def _read_measure_tables() -> dict[str, dict[str, dict[str, Any]]]:
+    """Read the tables of measures.toml, with the columns of each measure by its name."""
+    return tomllib.loads(Path(__file__).with_name("measures.toml").read_text("utf-8"))
+
+
+@array_dataclass
 class Response:
     """Time histories of a run at its stored samples.
 
@@ -477,6 +506,11 @@ class Response:
     force: np.ndarray
     slip: np.ndarray
     extra: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def span(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return float(self.time[-1] - self.time[0])
 
     @property
     def slides(self) -> np.ndarray:

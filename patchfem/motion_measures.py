@@ -47,11 +47,6 @@ def measure_interface(observations: Observations, stiffness) -> Values:
 
     `stiffness` is that of the first mode at the contact [N/m], 0 if no damping is computed.
     """
-    slides, low, force_at_low, high, force_at_high = np.moveaxis(observations.cycles, -1, 0)
-    ranges = high - low
-    half_range = _average_finite(ranges) / 2
-    secant = _average_finite((force_at_high - force_at_low) / ranges)
-
     # A reversal without stick takes a time of the size of round-off.
     stuck = observations.stick[0] / observations.span
     whole = np.round(stuck)
@@ -60,12 +55,12 @@ def measure_interface(observations: Observations, stiffness) -> Values:
         "stick_fraction": np.where(np.abs(stuck - whole) <= FULL_STICK, whole, stuck),
         "friction_force_peak": np.abs(observations.force).max(axis=-1),
         "slip_start_phase": mean_slip_phase(*observations.stick[1:]),
-        "secant_stiffness": np.where(half_range > MAX_RESTING_SLIDE_RANGE / 2, secant, np.nan),
     }
     area = observations.work * observations.period / observations.span
-    values |= measure_loop(half_range, *observations.harmonics, area, stiffness)
+    values |= measure_loop(observations.cycles[..., 1:], *observations.harmonics, area, stiffness)
 
     # Change of the mean slide from the first observed cycle to the last one.
+    slides = observations.cycles[..., 0]
     if slides.shape[-1] > 1:
         is_known = np.isfinite(slides)
         first = np.take_along_axis(slides, is_known.argmax(axis=-1)[..., None], axis=-1)[..., 0]
@@ -93,15 +88,16 @@ def mean_slip_phase(count, cosine, sine):
     return np.where(have_common_phase, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)[()]
 
 
-def measure_loop(half_range, slide, force, work, stiffness) -> Values:
-    """Return loop area, equivalent stiffness and equivalent damping of an interface.
+def measure_loop(reversals, slide, force, work, stiffness) -> Values:
+    """Return loop area, equivalent and secant stiffness, and equivalent damping of an interface.
 
     The equivalent stiffness is Re(F1/q1), as in harmonic balance. An interface at rest has neither stiffness nor damping.
 
     Parameters
     ----------
-    half_range : float or (...)
-        Half the range A of the relative displacement in a cycle [m].
+    reversals : (..., n, 4)
+        In each of n cycles the smallest slide [m] and the friction force there [N], and the largest slide and the force
+        there; NaN if they are unknown. Half the range A of the slide is the mean over the cycles.
     slide, force : complex or (...)
         First harmonics q1 and F1 of relative displacement and friction force, with one factor common to both.
     work : float or (...)
@@ -112,15 +108,19 @@ def measure_loop(half_range, slide, force, work, stiffness) -> Values:
     Returns
     -------
     dict
-        "loop_area" [J], "equivalent_stiffness" and "harmonic_force_ratio" |F1/q1| [N/m], and "equivalent_damping"
-        W/(2 pi K A^2) [1].
+        "loop_area" [J], "secant_stiffness" (F(q_max) - F(q_min))/2A, "equivalent_stiffness" and "harmonic_force_ratio"
+        |F1/q1| [N/m], and "equivalent_damping" W/(2 pi K A^2) [1].
     """
+    low, force_at_low, high, force_at_high = np.moveaxis(reversals, -1, 0)
+    half_range = _average_finite(high - low) / 2
     moves = (half_range > MAX_RESTING_SLIDE_RANGE / 2) & (np.abs(slide) > 0)
     with np.errstate(all="ignore"):
+        secant = _average_finite((force_at_high - force_at_low) / (high - low))
         ratio = np.where(moves, force, np.nan) / slide
         damping = np.divide(work, 2 * np.pi * stiffness * half_range**2)
     return {
         "loop_area": work,
+        "secant_stiffness": np.where(half_range > MAX_RESTING_SLIDE_RANGE / 2, secant, np.nan),
         "equivalent_stiffness": ratio.real,
         "harmonic_force_ratio": np.abs(ratio),
         "equivalent_damping": np.where(moves & np.greater(stiffness, 0), damping, np.nan),
@@ -174,7 +174,8 @@ def ratio_or_zero(part, total):
 def _average_finite(values):
     """Return the means (...) of those values (..., n) that are finite numbers; NaN without any."""
     is_known = np.isfinite(values)
-    return np.where(is_known, values, 0.0).sum(axis=-1) / is_known.sum(axis=-1)
+    with np.errstate(all="ignore"):
+        return np.where(is_known, values, 0.0).sum(axis=-1) / is_known.sum(axis=-1)
 
 
 class StepReversals(NamedTuple):

@@ -56,7 +56,7 @@ def find_commands(page: str) -> list:
 
 
 def apply_block(block: CodeBlock, package: Path) -> None:
-    """Insert a Python block into the copied package at the place that its first line names."""
+    """Insert a block into the copied package at the place that its first line names."""
     head, _, code = block.text.partition("\n")
     if new_file := re.fullmatch(r"# new file (\S+)", head):
         path = package / new_file[1]
@@ -75,10 +75,10 @@ def apply_block(block: CodeBlock, package: Path) -> None:
 
 
 def copy_package(folder: Path, page: str) -> Path:
-    """Copy the package into a folder, apply every Python block of a page, and return the path of the copy."""
+    """Copy the package into a folder, apply every block of a page, and return the path of the copy."""
     copy = shutil.copytree(PACKAGE, folder / "patchfem")
     for block in find_code_blocks(page):
-        if block.language == "python":
+        if block.language in ("python", "toml"):
             apply_block(block, copy)
     return copy
 

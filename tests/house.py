@@ -32,7 +32,7 @@ from import_graph import child_nodes, syntax_nodes  # noqa: E402
 
 BASELINE = "tests/house.toml"
 TREES = ("patchfem", "studies", "tests")
-# Modules that define measures; every other module of the package asks them.
+# Modules with the functions of measures.toml; every other module of the package asks them.
 MEASURE_TABLES = ("patchfem/response/rows.py", "patchfem/runs/results/patch_rows.py")
 SHOWN_LINES = 12  # largest number of lines that a message lists
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
@@ -317,17 +317,16 @@ def style_rules(source: Source):
             yield from record_rules(node)
 
 
-def measure_names(sources: list, root: Path) -> frozenset:
-    """Return the names of all measures: the first text in each row of the tables."""
-    names = set()
-    for source in sources:
-        if str(source.path.relative_to(root)) not in MEASURE_TABLES:
-            continue
-        for node in source.nodes:
-            if isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
-                if getattr(node.func, "id", "") in ("MeasureDefinition", "_make_random_rows"):
-                    names.add(node.args[0].value)
-    return frozenset(names)
+def measure_names(root: Path) -> frozenset:
+    """Return the names of all measures of measures.toml, except those that are constants of response/rows.py."""
+    path = root / "patchfem/measures.toml"
+    if not path.is_file():
+        return frozenset()
+    tables = tomllib.loads(path.read_text("utf-8"))
+    constants = re.findall(
+        r'^[A-Z_]+ = "(\w+)"', (root / MEASURE_TABLES[0]).read_text("utf-8"), re.M
+    )
+    return frozenset((tables["motion"].keys() | tables["patch"].keys()) - set(constants))
 
 
 def measure_rules(nodes: tuple, names: frozenset):
@@ -426,7 +425,7 @@ def count_sources(root: Path = ROOT) -> Counts:
     paths = sorted(path for tree in TREES for path in (root / tree).rglob("*.py"))
     sources = [parse_source(path.read_text("utf-8"), path) for path in paths]
     offered = offered_names(sources, root)
-    measures = measure_names(sources, root)
+    measures = measure_names(root)
     words = find_words([one for one in sources if one.path.is_relative_to(root / "patchfem")])
     for source in sources:
         folder = folder_of_file(source.path, root)

@@ -120,7 +120,7 @@ def write_law(text: str, law: tuple) -> str:
 def marched_folder(tmp_path_factory):
     """Return a copy of the package with the law and its time steps, where both laws have run with each effect."""
     folder = tmp_path_factory.mktemp("marched")
-    page = PAGE.replace('"harmonic", "timeless"', '"harmonic march", "timeless"')
+    page = PAGE.replace('supports = "harmonic"', 'supports = "harmonic march"')
     assert page != PAGE
     steps = Path(__file__).with_name("added_law.md").read_text("utf-8")
     adding.copy_package(folder, page + steps)

@@ -274,6 +274,7 @@ PICTURES = {
     "loop": {"bench", "rig"},
     "history": {"bench", "rig", "linear", "two interfaces"},
     "levels": set(),
+    "curve": set(),
 }
 
 
@@ -305,3 +306,19 @@ def test_exact_plots_draw_on_given_axes(picture, name, results):
     else:
         with pytest.raises(pf.PatchfemError, match=rf"plot\.{picture}: nothing to draw: \w+"):
             draw()
+
+
+def test_always_every_chart_of_page_is_drawn_by_title(results, tmp_path):
+    """Each chart of the page of a run is drawn by its title, from the result and from its folder."""
+    result = results["rig"]
+    titles = result.plot.charts
+    assert {"Energy", "Friction loop"} < set(titles)
+    folder = result.save(tmp_path / "out")
+    page = (folder / "report.html").read_text("utf-8")
+    for title in titles:
+        axes = result.plot.chart(title)
+        assert axes.get_title() == title and title in page
+        assert pf.plot.folder(folder, title).get_ylabel() == axes.get_ylabel()
+    for draw in (result.plot.chart, lambda title: pf.plot.folder(folder, title)):
+        with pytest.raises(pf.PatchfemError, match="Energy"):
+            draw("none of these")

@@ -263,8 +263,8 @@ def test_always_scene_tables_have_effects():
     assert len(names) > 50
     # the defaults of these keys have no effect, see patchfem/scene/text.py
     missing = names - set(EFFECTS) - {"accuracy", "measured.reading=peak"}
-    assert not missing, f"add entries to patchfem/effects.py: {sorted(missing)}"
-    with pytest.raises(PatchfemError, match=r"contact\.ripple: .* no entry in EFFECTS"):
+    assert not missing, f"add rows to patchfem/effects.toml: {sorted(missing)}"
+    with pytest.raises(PatchfemError, match=r"contact\.ripple: .* no row in"):
         list_absent_effects(["contact.tilt", "contact.ripple"])
 
 

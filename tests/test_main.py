@@ -11,7 +11,7 @@ import pytest
 from command_line import run_cli
 
 import patchfem
-from patchfem.model import drive
+from patchfem.model import rig
 
 LEAVING = """\
 import atexit, sys, threading, time
@@ -150,7 +150,7 @@ def test_always_internal_error_names_file_and_line(tmp_path, monkeypatch):
     They give the innermost line of the package and the advice to run `patchfem doctor`.
     """
     (tmp_path / "rig.toml").write_text(RIG, "utf-8")
-    monkeypatch.setattr(drive, "find_first_period", lambda modes: {}["a key"])
+    monkeypatch.setattr(rig, "find_first_period", lambda modes: {}["a key"])
     answer = run_cli("plan", tmp_path / "rig.toml")
     first, second = answer.err.splitlines()
     found = re.fullmatch(

@@ -52,8 +52,7 @@ PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
 TUPLE_MODULES = (
     "contact/set_arrays.py",
     "hybrid/records.py",
-    "points/case_rows.py",
-    "points/law_rows.py",
+    "points/rows.py",
 )
 CACHE_FOLDER_PATTERN = re.compile(r"[0-9a-f]{16}")
 # Time [s] since the last start of a process with a folder of compiled code after which it is removed: 30 days. Every edit of

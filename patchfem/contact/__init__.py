@@ -5,10 +5,10 @@ forces f or pressures, the gap under load, the approach delta and the rotation t
 
     w = g + theta x - delta + C f >= 0,    f >= 0,    f . w = 0.
 
-`gaps` has the shapes of the surfaces. `press_cases` presses many cases of a pair of pieces on a table of contact sets
-(`set_table`), from which `edges` derives where the contacts end. `press.press_patch` presses one patch, bare or with
-asperities (`asperity_laws`, `asperity_layer`): `unilateral` solves it as a single case of a table, if need be from the set
-that the gradients of `bounded` show, and checks the solution. Read `gaps`, `set_table`, `press_cases` and `press` first.
+`gaps` has the shapes of the surfaces. `press.press` presses the cases of a pair of pieces, bare or with asperities
+(`asperity_laws`, `asperity_layer`): `press_cases` finds their contact sets on a table (`set_table`), from which `edges`
+derives where the contacts end. `unilateral` solves a case alone whose sets cycle, if need be from the set that the
+gradients of `bounded` show, and checks the solution. Read `gaps`, `set_table`, `press_cases` and `press` first.
 
 `contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `press_path_kernels`).
 

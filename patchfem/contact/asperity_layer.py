@@ -16,7 +16,8 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ..core import NotConverged, PatchfemError
 from .asperity_laws import SmoothAsperities
-from .unilateral import ContactProblem, compute_balances, solve
+from .bounded import BoundedProblem
+from .unilateral import compute_balances, describe_residuals, solve
 
 # Largest number of Newton steps; thin layers on rough gaps need up to 40
 MAX_LAYER_NEWTON_STEPS = 60
@@ -24,6 +25,9 @@ LAYER_DIVERGED_MESSAGE = (
     "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
     'deviation, or set law = "linear"'
 )
+# Largest relative residual of a solution; rounding errors of steep laws stay below it
+SMOOTH_LAW_RESIDUAL_TOL = 1e-9
+RESIDUAL_REMEDY = "; make the rough layer softer (raise the decay length or the height deviation), or leave the layer out"
 # Largest logarithm of a pressure [Pa] at which the asperity layer counts as untouched
 MAX_UNTOUCHED_LOG_PRESSURE = -300.0
 # Largest logarithm of a force [N] for which products with the exponential function do not overflow
@@ -50,7 +54,7 @@ class AsperityProblem(NamedTuple):
     asperities: SmoothAsperities
     compliance: np.ndarray
     area: np.ndarray
-    contact: ContactProblem
+    contact: BoundedProblem
 
     @property
     def mean_pressure(self) -> float:
@@ -59,12 +63,12 @@ class AsperityProblem(NamedTuple):
 
     def separation(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Return the separations (n,) [m] of the mean planes for given forces [N] and a given motion."""
-        return self.contact.gap - self.contact.motions @ motion + self.compliance @ force
+        return self.contact.gap - motion @ self.contact.motions + self.compliance @ force
 
     def imbalance(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Return load [N] and moment [N m] (r,) that forces (n,) [N] and spring do not balance at a given motion (r,)."""
         contact = self.contact
-        return contact.target - contact.motions.T @ force - contact.springs * motion
+        return contact.target - contact.motions @ force - contact.springs * motion
 
 
 class AsperitySolution(NamedTuple):
@@ -103,7 +107,7 @@ def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _Newto
         Missing load [N] and moment [N m].
     """
     contact = problem.contact
-    columns = np.column_stack([contact.motions, mismatch])
+    columns = np.column_stack([*contact.motions, mismatch])
     forces = np.zeros(columns.shape)
 
     # Forces D^1/2 (I + D^1/2 C D^1/2)^-1 D^1/2 of the nodes that the layer loads, for each column; this matrix is well
@@ -119,13 +123,13 @@ def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _Newto
     # The motion balances load and moment
     by_motions = forces[:, :-1]
     by_mismatch = forces[:, -1]
-    motion = imbalance + contact.motions.T @ by_mismatch
+    motion = imbalance + contact.motions @ by_mismatch
     if motion.size:
-        tangent = contact.motions.T @ by_motions + np.diag(contact.springs)
+        tangent = contact.motions @ by_motions + np.diag(contact.springs)
         motion = np.linalg.lstsq(tangent, motion, rcond=1e-14)[0]
     force = by_motions @ motion - by_mismatch
     displacement = problem.compliance @ force
-    return _NewtonStep(force, motion, mismatch - contact.motions @ motion + displacement)
+    return _NewtonStep(force, motion, mismatch - motion @ contact.motions + displacement)
 
 
 def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolution:
@@ -292,21 +296,30 @@ def press_with_asperities(layer: AsperityProblem) -> AsperitySolution:
     Raises
     ------
     NotConverged
-        If Newton's method fails.
+        If Newton's method fails, or if a residual exceeds `SMOOTH_LAW_RESIDUAL_TOL`.
     PatchfemError
         If the pressure under a prescribed approach is too large to compute.
     """
     problem = layer.contact
-    if not problem.target.size:
-        return _solve_at_approach(layer)
+    if problem.target.size:
+        # The largest closing of a node per unit of motion becomes 1, so that load and moment become comparable
+        scale = 1 / np.abs(problem.motions).max(axis=1)
+        scaled = problem._replace(
+            motions=problem.motions * scale[:, None],
+            target=problem.target * scale,
+            springs=problem.springs * scale**2,
+        )
+        scaled_layer = layer._replace(contact=scaled)
+        solution = _solve_newton(scaled_layer, *_linearised_start(scaled_layer))
+        solution = solution._replace(motion=solution.motion * scale)
+    else:
+        solution = _solve_at_approach(layer)
 
-    # The largest closing of a node per unit of motion becomes 1, so that load and moment become comparable
-    scale = 1 / np.abs(problem.motions).max(axis=0)
-    scaled = problem._replace(
-        motions=problem.motions * scale,
-        target=problem.target * scale,
-        springs=problem.springs * scale**2,
-    )
-    scaled_layer = layer._replace(contact=scaled)
-    solution = _solve_newton(scaled_layer, *_linearised_start(scaled_layer))
-    return solution._replace(motion=solution.motion * scale)
+    residuals = compute_law_residuals(layer, solution)
+    if not all(value <= SMOOTH_LAW_RESIDUAL_TOL for value in residuals.values()):
+        raise NotConverged(
+            describe_residuals(
+                residuals, SMOOTH_LAW_RESIDUAL_TOL, "contact.asperities", RESIDUAL_REMEDY
+            )
+        )
+    return solution

@@ -198,48 +198,39 @@ def make_block(
     -------
     BlockCompliance
     """
-    # Waves between guides; equal pieces count twice
+    # Waves between guides, and the change by free sides; equal pieces count twice
     n_x, n_y = cells
     k_x = np.arange(n_x) * np.pi / shape.length
     k_y = np.arange(n_y)[:, None] * np.pi / shape.width
     k = np.hypot(k_x, k_y)
     along_fraction = np.divide(k_x**2, k**2, out=np.ones(k.shape), where=k > 0)
-    normal = np.zeros(k.shape)
-    shear = np.zeros(k.shape)
-    multiplicities = {stack: stacks.count(stack) for stack in stacks}
-    for stack, multiplicity in multiplicities.items():
-        waves = compute_wave_compliance(k, stack)
-        normal += multiplicity * waves.normal
-        shear += multiplicity * waves.across
-        shear += multiplicity * along_fraction * (waves.along - waves.across)
-
-    changes = (None, None)
-    if side_level is not None:
-        changes = _place_sides(shape, multiplicities, cells, side_level)
-    sizes = (shape.length, shape.width)
-    return BlockCompliance(
-        CellCompliance(*sizes, normal, changes[0], pairs=shape.pairs),
-        CellCompliance(*sizes, shear, changes[1], pairs=shape.pairs),
-    )
-
-
-def _place_sides(
-    shape: BlockShape, multiplicities: dict[LayerStack, int], cells: tuple[int, int], level: int
-) -> tuple[SideCompliance, SideCompliance]:
-    """Return the changes of the normal and of the shear compliance of cells (nx, ny) by free sides.
-
-    `multiplicities` holds how often each stack of layers occurs.
-    """
     normal = 0.0
     shear = 0.0
-    for stack, multiplicity in multiplicities.items():
-        change = sides.compute_side_change(stack, shape, level)
-        normal = normal + multiplicity * change.normal
-        shear = shear + multiplicity * change.shear
+    normal_change = 0.0
+    shear_change = 0.0
+    change = None
+    for stack in dict.fromkeys(stacks):
+        multiplicity = stacks.count(stack)
+        waves = compute_wave_compliance(k, stack)
+        normal = normal + multiplicity * waves.normal
+        shear = shear + multiplicity * (
+            waves.across + along_fraction * (waves.along - waves.across)
+        )
+        if side_level is not None:
+            change = sides.compute_side_change(stack, shape, side_level)
+            normal_change = normal_change + multiplicity * change.normal
+            shear_change = shear_change + multiplicity * change.shear
+
+    normal = CellCompliance(shape.length, shape.width, normal, pairs=shape.pairs)
+    shear = CellCompliance(shape.length, shape.width, shear, pairs=shape.pairs)
+    if change is None:
+        return BlockCompliance(normal, shear)
 
     # The splines along both axes do not depend on the layers
-    n_x, n_y = cells
     x_edges = np.linspace(-shape.length / 2, shape.length / 2, n_x + 1)
     y_edges = np.linspace(-shape.width / 2, shape.width / 2, n_y + 1)
     integrals = (change.x.integrate(x_edges), change.y.integrate(y_edges))
-    return SideCompliance(*integrals, normal), SideCompliance(*integrals, shear)
+    return BlockCompliance(
+        replace(normal, sides=SideCompliance(*integrals, normal_change)),
+        replace(shear, sides=SideCompliance(*integrals, shear_change)),
+    )

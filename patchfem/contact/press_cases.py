@@ -251,10 +251,10 @@ def _refine_balance(
 
     def find_missing(force, rotation) -> np.ndarray:
         """Return load and moment (n, 2) that forces (n, m) [N] and springs at a rotation (n,) [rad] do not balance."""
-        missing = np.empty((len(force), 2))
-        missing[:, 0] = holders.load - force.sum(axis=1)
-        missing[:, 1] = holders.moment - force @ x - holders.spring * rotation
-        return missing
+        with np.errstate(invalid="ignore"):  # of an infinite load
+            load = holders.load - force.sum(axis=1)
+            moment = holders.moment - force @ x - holders.spring * rotation
+        return np.stack([load, moment], axis=1)
 
     missing = find_missing(find_force(closing), closing[:, 1])
     change = _solve_motion(table.work[slots], holders, missing)
@@ -272,8 +272,9 @@ def _refine_balance(
         opening = (np.abs(closing) * table.round_off[slots]).sum(axis=1) / smallest
     residual = np.fmax(np.fmax(balance, opening), 0.0)
 
-    # A single node in contact does not determine a free rotation
+    # A single node in contact does not determine a free rotation; others may carry round-off
     is_determined = np.isfinite(closing).all(axis=1)
     is_free = holders.can_rotate & (holders.spring == 0)
-    is_determined &= ~is_free | (np.count_nonzero(force > 0, axis=1) > 1)
+    n_loaded = np.count_nonzero(force > MAX_RESIDUAL * holders.load[:, None], axis=1)
+    is_determined &= ~is_free | (n_loaded > 1)
     return closing, np.where(is_determined, residual, np.inf)

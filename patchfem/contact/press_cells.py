@@ -90,46 +90,47 @@ def press_cells(
             "contact.area.hardness: a pressure of at most the hardness carries "
             f"{largest_load:.4g} N on the face, less than the load of {loading.load:.4g} N; raise the hardness"
         )
-    # Motions of the holder, with load lines and springs; those that are not free stay
-    x = np.broadcast_to(compliance.x, gap.shape)
-    y = np.broadcast_to(compliance.y[:, None], gap.shape)
-    axes = {
-        "closing": (np.ones(gap.shape), 1.0, 0.0),
-        "tilt_x": (x, loading.line_x, loading.spring_x),
-        "tilt_y": (y, loading.line_y, loading.spring_y),
-    }
+    # Closing and tilts along both axes, with load lines and springs; those without a line (nan) are fixed
+    motions = np.stack(np.broadcast_arrays(np.ones(gap.shape), compliance.x, compliance.y[:, None]))
+    lines = np.array([1.0, loading.line_x, loading.line_y], float)
+    springs = np.array([0.0, loading.spring_x, loading.spring_y])
     is_loaded = loading.load is not None
-    free = {name: axis for name, axis in axes.items() if is_loaded and axis[1] is not None}
-    for motion, line, spring in free.values():
-        outermost = motion.max()
-        if spring == 0 and abs(line) > outermost:
-            raise NotConverged(
-                f"contact: the load line at {abs(line):.5g} m lies beyond the centres of the outermost cells, at "
-                f"{outermost:.5g} m, so that no pressure of these cells balances the load; raise contact.area.cells or "
-                "move contact.load_line inwards"
-            )
+    is_free = np.isfinite(lines) & is_loaded
+    outermost = motions.max(axis=(1, 2))
+    is_beyond = is_free & (springs == 0) & (np.abs(lines) > outermost)
+    if is_beyond.any():
+        axis = int(np.argmax(is_beyond))
+        raise NotConverged(
+            f"contact: the load line at {abs(lines[axis]):.5g} m lies beyond the centres of the outermost cells, at "
+            f"{outermost[axis]:.5g} m, so that no pressure of these cells balances the load; raise contact.area.cells or "
+            "move contact.load_line inwards"
+        )
 
     # The gap counts from its lowest point, or from the approach
     first_approach = gap.min() if is_loaded else loading.approach
-    motions = np.array([axis[0] for axis in free.values()])
-    target = (
-        (loading.load or 0.0) / compliance.cell_area * np.array([axis[1] for axis in free.values()])
+    problem = BoundedProblem(
+        gap - first_approach,
+        0.0,
+        loading.hardness,
+        motions[is_free],
+        (loading.load or 0.0) / compliance.cell_area * lines[is_free],
+        springs[is_free] / compliance.cell_area,
     )
-    springs = np.array([axis[2] for axis in free.values()]) / compliance.cell_area
-    problem = BoundedProblem(gap - first_approach, 0.0, loading.hardness, motions, target, springs)
     solution = solve_bounded(compliance, problem, start, tolerance, MAX_ITERATIONS)
     if not solution.residual <= tolerance:
         raise NotConverged(
             f"contact: the pressure did not converge; after {solution.n_iterations} steps the gap "
             f"is wrong by {solution.residual:.1e} of the displacement, more than {tolerance:.1e}"
         )
-    found = dict(zip(free, solution.motion.tolist()))
+    motion = np.zeros(3)
+    motion[is_free] = solution.motion
+    closing, tilt_x, tilt_y = motion.tolist()
     return PressedCells(
         pressure=solution.traction,
         gap=np.where(solution.traction > 0, 0.0, np.maximum(solution.slope, 0.0)),
-        approach=float(first_approach) + found.get("closing", 0.0),
-        tilt_x=-found.get("tilt_x", 0.0),
-        tilt_y=-found.get("tilt_y", 0.0),
+        approach=float(first_approach) + closing,
+        tilt_x=-tilt_x,
+        tilt_y=-tilt_y,
         n_iterations=solution.n_iterations,
     )
 

@@ -31,31 +31,9 @@ INDEFINITE_COMPLIANCE_MESSAGE = (
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
     "cells of contact.mesh"
 )
-# Number of bisections, after which the rest position of a rigid piece is known to 1e-30 of the steepest slope of the gap
-N_BISECTIONS = 100
+MAX_TABLES = 4  # number of tables on which a contact problem is solved, of which the last two start from the gradients
 # Smallest total force [N] in a divisor; it keeps residuals of open pieces finite
 MIN_TOTAL_FORCE = 1e-200
-
-
-class ContactProblem(NamedTuple):
-    """Contact of the n nodes of a patch that is pressed by a rigid holder with r free motions.
-
-    - gap (n,): Gap [m] between the undeformed surfaces; negative where they overlap under a given approach.
-    - motions (n, r): Closing of each node per unit of each free motion: ones for the approach [m], then the positions
-      [m] for the rotation. No column: the approach is prescribed and already contained in the gap.
-    - target (r,): Load [N], then the moment about x = 0 [N m] of a free rotation.
-    - springs (r,): Stiffness of the holder against each motion: 0 for the approach, [N m/rad] for the rotation.
-    """
-
-    gap: np.ndarray
-    motions: np.ndarray
-    target: np.ndarray
-    springs: np.ndarray
-
-    @property
-    def has_free_rotation(self) -> bool:
-        """Whether the holder rotates and no spring restrains it."""
-        return self.springs.size == 2 and self.springs[1] == 0
 
 
 class ContactSolution(NamedTuple):
@@ -69,7 +47,7 @@ class ContactSolution(NamedTuple):
     motion: np.ndarray
 
 
-def make_problem(x, gap, holder: Holders) -> ContactProblem:
+def make_problem(x, gap, holder: Holders) -> "bounded.BoundedProblem":
     """Return the contact problem of a patch, with an unknown motion for each load that the holder prescribes.
 
     Parameters
@@ -81,13 +59,14 @@ def make_problem(x, gap, holder: Holders) -> ContactProblem:
 
     Returns
     -------
-    ContactProblem
+    BoundedProblem
+        Its motions are the approach [m] and the rotation -theta [rad]; without them the approach is prescribed.
     """
     loads = [value for value in (holder.load, holder.moment) if not np.isnan(value)]
     motions = np.ones((len(loads), x.size))
     motions[1:] = x
     springs = np.array([0.0, holder.spring][: len(loads)])
-    return ContactProblem(gap, motions.T, np.array(loads, float), springs)
+    return bounded.BoundedProblem(gap, 0.0, np.inf, motions, np.array(loads, float), springs)
 
 
 class _NodalCompliance:
@@ -102,38 +81,25 @@ class _NodalCompliance:
         return displacement / self.self_compliance
 
 
-def solve_by_gradients(
-    compliance: np.ndarray, problem: ContactProblem
-) -> "bounded.BoundedSolution":
+def solve_by_gradients(compliance: np.ndarray, problem) -> ContactSolution:
     """Solve a contact problem by conjugate gradients, up to `GRADIENT_RESIDUAL_TOL`.
 
-    Parameters
-    ----------
-    compliance : (n, n) ndarray
-        Compliance [m/N] of the nodes.
-    problem : ContactProblem
-        Gap [m], motions, loads and springs.
-
-    Returns
-    -------
-    BoundedSolution
-        Forces (n,) [N] in place of tractions.
+    `compliance` (n, n) [m/N] is that of the nodes, and `problem` a BoundedProblem.
     """
-    program = bounded.BoundedProblem(
-        problem.gap, 0.0, np.inf, problem.motions.T, problem.target, problem.springs
+    solution = bounded.solve_bounded(
+        _NodalCompliance(compliance), problem, tolerance=GRADIENT_RESIDUAL_TOL
     )
-    operator = _NodalCompliance(compliance)
-    return bounded.solve_bounded(operator, program, tolerance=GRADIENT_RESIDUAL_TOL)
+    return ContactSolution(solution.traction, solution.motion)
 
 
-def _solve_on_one_node(compliance: np.ndarray, problem: ContactProblem) -> ContactSolution | None:
+def _solve_on_one_node(compliance: np.ndarray, problem) -> ContactSolution | None:
     """Solve a patch under a free rotation that touches at a single node, or return None if no node qualifies.
 
     The node lies under the load line. Any rotation that leaves the other nodes open is a solution. It is 0 if the other
     nodes are open then, else the mean of the two limits. `compliance` (n, n) [m/N] is that of the nodes.
     """
     gap = problem.gap
-    position = problem.motions[:, 1]
+    position = problem.motions[1]
     load, moment = problem.target
     node = int(np.argmin(np.abs(position - moment / load)))
     if abs(position[node] - moment / load) > 1e-15 * np.ptp(position):
@@ -160,18 +126,18 @@ def _solve_on_one_node(compliance: np.ndarray, problem: ContactProblem) -> Conta
 
 
 def solve_on_table(
-    compliance: np.ndarray, problem: ContactProblem, start: np.ndarray
+    compliance: np.ndarray, problem, near: ContactSolution
 ) -> ContactSolution | None:
-    """Solve a contact problem as the only case of a table of contact sets.
+    """Solve a contact problem as the only case of a table of contact sets, with the gap measured from a motion.
 
     Parameters
     ----------
     compliance : (n, n) ndarray
         Compliance [m/N] of the nodes.
-    problem : ContactProblem
+    problem : BoundedProblem
         Gap [m], motions and loads of the nodes.
-    start : (n,) bool ndarray
-        First contact set; an empty one is replaced by a guess.
+    near : ContactSolution
+        Motion from which the gap is measured, and forces of the first contact set; without any the set is a guess.
 
     Returns
     -------
@@ -180,22 +146,21 @@ def solve_on_table(
     """
     # A prescribed approach is contained in the gap. Under a rotation the positions are measured from the load line, near
     # which a small contact lies, so that approach and rotation are well determined.
-    n_motions = problem.target.size
-    load, moment = np.append(problem.target, [np.nan, np.nan])[:2]
+    n_motions = near.motion.size
+    gap = problem.gap - near.motion @ problem.motions
+    load, moment = np.append(problem.target - problem.springs * near.motion, [np.nan, np.nan])[:2]
+    columns = np.stack([np.ones(gap.size), np.zeros(gap.size), gap])
     approach = np.nan if n_motions else 0.0
     spring = 0.0
-    columns = np.zeros((3, problem.gap.size))
-    columns[0] = 1.0
-    columns[2] = problem.gap
     if n_motions > 1:
         spring = problem.springs[1]
         load_line = moment / load
-        columns[1] = problem.motions[:, 1] - load_line
+        columns[1] = problem.motions[1] - load_line
         moment = 0.0
 
-    table = SetTable(compliance, columns, problem.gap.size, has_ends=False)
+    table = SetTable(compliance, columns, gap.size, has_ends=False)
     holder = Holders(*np.array([[load], [approach], [moment], [spring]]))
-    pressed = press_on_table(table, holder, np.ones((1, 1)), start[None])
+    pressed = press_on_table(table, holder, np.ones((1, 1)), near.force[None] > 0)
     if pressed.slot[0] < 0:
         return None
     unknown = table.combine(pressed.slot, pressed.closing)[0]
@@ -203,44 +168,10 @@ def solve_on_table(
     motion = pressed.closing[0, :n_motions]
     if n_motions > 1:
         motion[0] -= load_line * motion[1]
-    return ContactSolution(force, motion)
+    return ContactSolution(force, near.motion + motion)
 
 
-def find_rest_motion(problem: ContactProblem) -> np.ndarray:
-    """Return about the approach [m] and rotation [rad] q (r,) at which a rigid piece rests on the other one.
-
-    The node that touches first moves towards +x as the rotation grows, and with it the moment of the load. Bisection finds
-    the rotation at which load and spring balance the prescribed moment.
-
-    `problem` has the gap of the nodes and the loads; without a load r is 0.
-    """
-    motion = np.zeros(problem.target.size)
-    gap = problem.gap
-    if motion.size > 1:
-        load, moment = problem.target
-        spring = problem.springs[1]
-        position = problem.motions[:, 1]
-
-        # Beyond the steepest slope of the gap the piece rests on an end, which only a spring allows
-        high = np.ptp(gap) / np.diff(position).min()
-        if spring > 0:
-            high += (load * np.abs(position).max() + abs(moment)) / spring
-        low = -high
-        for _ in range(N_BISECTIONS):
-            motion[1] = (low + high) / 2
-            node = np.argmin(gap - motion[1] * position)
-            if load * position[node] + spring * motion[1] > moment:
-                high = motion[1]
-            else:
-                low = motion[1]
-        gap = gap - motion[1] * position
-    motion[:1] = gap.min()
-    return motion
-
-
-def solve(
-    compliance: np.ndarray, problem: ContactProblem, start: np.ndarray | None = None
-) -> ContactSolution:
+def solve(compliance: np.ndarray, problem) -> ContactSolution:
     """Solve the contact problem of a patch.
 
     The forces are those of a strictly convex quadratic program, so that neither the set from which the search starts nor
@@ -250,10 +181,8 @@ def solve(
     ----------
     compliance : (n, n) ndarray
         C [m/N], positive definite.
-    problem : ContactProblem
+    problem : BoundedProblem
         Gap [m], motions and loads of the nodes.
-    start : (n,) bool ndarray, optional
-        Contact set of a similar problem, which saves iterations.
 
     Returns
     -------
@@ -265,49 +194,31 @@ def solve(
         With a remedy, if no contact set can be solved for, or if the residuals of the solution are too large.
     """
     # A patch that may rotate freely can rest on a single node, whose set does not determine the rotation
-    if problem.has_free_rotation:
+    springs = problem.springs
+    if springs.size == 2 and springs[1] == 0:
         solution = _solve_on_one_node(compliance, problem)
         if solution is not None:
             return solution
 
-    def search(active: np.ndarray, motion: np.ndarray) -> ContactSolution | None:
-        """Return the solution that is found from a contact set (n,), with the gap measured from a motion (r,)."""
-        moved = problem._replace(
-            gap=problem.gap - problem.motions @ motion,
-            target=problem.target - problem.springs * motion,
-        )
-        found = solve_on_table(compliance, moved, active)
-        return found and found._replace(motion=found.motion + motion)
-
-    # The search starts from the rest position of a rigid piece. The closing there is about the geometric mean of the
-    # deflections under a point load and under a uniform load.
-    motion = find_rest_motion(problem)
-    if start is None or not start.any():
-        unit_depth = np.sqrt(np.abs(compliance.diagonal().mean() * compliance.mean()))
-        start = problem.gap - problem.motions @ motion < problem.target[:1].sum() * unit_depth
-
     # A gap that is measured from the motion found loses no digits; where the sets cycle, the gradients show the set
-    for has_gradients in (False, False, True):
-        if has_gradients:
-            by_gradients = solve_by_gradients(compliance, problem)
-            start = by_gradients.traction > 0
-            motion = by_gradients.motion
-        solution = search(start, motion)
-        if solution is None:
-            continue
-        residuals = compute_residuals(compliance, problem, solution)
-        if all(value <= MAX_RESIDUAL for value in residuals.values()):
-            return solution
-        start = solution.force > 0
-        motion = solution.motion
-    if solution is None:
+    near = ContactSolution(np.zeros(problem.gap.size), np.zeros(springs.size))
+    residuals = {}
+    for attempt in range(MAX_TABLES):
+        solution = solve_on_table(compliance, problem, near)
+        if solution is not None:
+            residuals = compute_residuals(compliance, problem, solution)
+            if all(value <= MAX_RESIDUAL for value in residuals.values()):
+                return solution
+        near = solution
+        if solution is None or attempt == 1:
+            near = solve_by_gradients(compliance, problem)
+    if not residuals:
         raise NotConverged(explain_singular_set(compliance, problem))
-    refuse_residuals(residuals, MAX_RESIDUAL)
-    return solution
+    raise NotConverged(describe_residuals(residuals, MAX_RESIDUAL))
 
 
 def compute_residuals(
-    compliance: np.ndarray, problem: ContactProblem, solution: ContactSolution
+    compliance: np.ndarray, problem, solution: ContactSolution
 ) -> dict[str, float]:
     """Compute the relative residuals of the contact conditions for a solution.
 
@@ -318,7 +229,7 @@ def compute_residuals(
     ----------
     compliance : (n, n) ndarray
         C [m/N] of the problem.
-    problem : ContactProblem
+    problem : BoundedProblem
         Gap [m], motions and loads as they were given.
     solution : ContactSolution
         Forces and motion that are checked.
@@ -329,8 +240,8 @@ def compute_residuals(
         penetration, tension, complementarity, and the balances of `compute_balances`.
     """
     force = solution.force
-    opening = problem.gap - problem.motions @ solution.motion + compliance @ force
-    scale = np.abs(problem.gap) + np.abs(problem.motions) @ np.abs(solution.motion)
+    opening = problem.gap - solution.motion @ problem.motions + compliance @ force
+    scale = np.abs(problem.gap) + np.abs(solution.motion) @ np.abs(problem.motions)
     scale += np.abs(compliance) @ np.abs(force)
     relative_opening = opening / np.where(scale > 0, scale, 1.0)
     load = max(force.sum(), MIN_TOTAL_FORCE)
@@ -344,14 +255,14 @@ def compute_residuals(
     )
 
 
-def compute_balances(problem: ContactProblem, solution) -> dict[str, float]:
+def compute_balances(problem, solution) -> dict[str, float]:
     """Compute the relative residuals of the balance of load and moment, as far as they are prescribed.
 
     A moment is relative to the load times the length of the interface, plus the moment of the spring.
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : BoundedProblem
         Motions, loads and springs.
     solution : ContactSolution or AsperitySolution
         Forces and motion that are checked.
@@ -364,13 +275,13 @@ def compute_balances(problem: ContactProblem, solution) -> dict[str, float]:
     if not problem.target.size:
         return {}
     spring_load = problem.springs * solution.motion
-    error = np.abs(problem.target - problem.motions.T @ solution.force - spring_load)
-    scale = problem.target[0] * np.ptp(problem.motions, axis=0) + np.abs(spring_load)
+    error = np.abs(problem.target - problem.motions @ solution.force - spring_load)
+    scale = problem.target[0] * np.ptp(problem.motions, axis=1) + np.abs(spring_load)
     scale[0] = problem.target[0]
     return dict(zip(("force_balance", "moment_balance"), (error / scale).tolist()))
 
 
-def explain_singular_set(compliance: np.ndarray, problem: ContactProblem) -> str:
+def explain_singular_set(compliance: np.ndarray, problem) -> str:
     """Return the error message for a contact set whose equations are singular.
 
     A prescribed rotation is determined by any node in contact, so only the compliance itself can be at fault.
@@ -379,7 +290,7 @@ def explain_singular_set(compliance: np.ndarray, problem: ContactProblem) -> str
     ----------
     compliance : (n, n) ndarray
         Compliance of the pieces [m/N].
-    problem : ContactProblem
+    problem : BoundedProblem
         Problem whose equations are singular.
     """
     if dpotrf(compliance.T, lower=1)[1]:
@@ -389,30 +300,26 @@ def explain_singular_set(compliance: np.ndarray, problem: ContactProblem) -> str
             "contact: numbers in the contact equations became too large to compute; check the units and magnitudes "
             "of load, gap and stiffnesses"
         )
-    holder = "name" if problem.has_free_rotation else "raise"
+    holder = "name" if problem.springs[1] == 0 else "raise"
     return (
         "contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "
         f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness"
     )
 
 
-def refuse_residuals(residuals, tolerance: float, place: str = "contact", remedy: str = "") -> None:
-    """Raise NotConverged if a residual exceeds its tolerance or is NaN.
+def describe_residuals(
+    residuals, tolerance: float, place: str = "contact", remedy: str = ""
+) -> str:
+    """Return the error message for residuals of which one exceeds a tolerance or is NaN.
 
     Parameters
     ----------
-    residuals : mapping
+    residuals : dict
         Relative residuals by name.
     tolerance : float
         Largest residual that is accepted.
-    place : str
-        Beginning of the message.
-    remedy : str
-        End of the message.
+    place, remedy : str
+        Beginning and end of the message.
     """
-    if all(value <= tolerance for value in residuals.values()):
-        return
-    largest_name = max(residuals, key=lambda name: (np.isnan(residuals[name]), residuals[name]))
-    raise NotConverged(
-        f"{place}: the residual {largest_name} = {residuals[largest_name]:.2e} exceeds {tolerance:.0e}{remedy}"
-    )
+    name = max(residuals, key=lambda name: (np.isnan(residuals[name]), residuals[name]))
+    return f"{place}: the residual {name} = {residuals[name]:.2e} exceeds {tolerance:.0e}{remedy}"

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..mesh.elements import ELEMENTS, number_cells
 from ..mesh.grading import EQUAL_LENGTH_TOL
 from ..mesh.pieces import find_edges
-from .elasticity import CellPoints, compute_stress
-from .recovery import Cells, make_points
+from .elasticity import compute_stiffness
+from .recovery import Cells
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,39 +80,23 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
     along = across[:, ::-1] * [1.0, -1.0]
 
     # The forces in equilibrium with the stress of the coating, divided by the length of a node
-    coating = _select_coating(cells, nodes)
-    gauss_points = make_points(coating, "gauss")
-    force = np.stack([-_nodal_forces(coating, gauss_points, motion)[nodes] for motion in u])
+    force = -_compute_coating_forces(cells, nodes, u)[:, nodes]
     shear = (force * along).sum(axis=2) / length
     normal = (force * across).sum(axis=2) / length
     return CoatingTraction(nodes, length, force, shear, normal)
 
 
-def _select_coating(cells: Cells, nodes) -> Cells:
-    """Return the coating cells that touch given nodes; no other cell exerts a force of the coating on them."""
-    groups = {}
-    n_cells = 0
-    for kind, group in cells.groups.items():
-        is_coating = cells.is_coating[n_cells : n_cells + len(group)]
-        n_cells += len(group)
-        groups[kind] = group[is_coating & np.isin(group, nodes).any(axis=1)]
-    return Cells(cells.points, groups, np.ones(sum(map(len, groups.values())), bool), cells.layers)
-
-
-def _nodal_forces(coating: Cells, gauss_points: list[CellPoints], u) -> np.ndarray:
-    """Return nodal forces (N, 2) [N/m] in equilibrium with the stress of coating cells under u (N, 2) [m].
-
-    `gauss_points` are the integration points of the cells, one entry for each element of `coating.groups`.
-    """
-    out = np.zeros(coating.points.shape)
-    for nodes, points in zip(coating.groups.values(), gauss_points):
-        strain = points.strain(u[nodes])
-        xx, yy, _, xy = np.moveaxis(
-            compute_stress(strain, np.ones(strain.shape[1:], bool), coating.layers), -1, 0
-        )
-        tensor = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2)
-        forces = (points.weights[..., None, None] * tensor @ points.gradients).sum(axis=1)
-        np.add.at(out, nodes, forces.swapaxes(1, 2))
+def _compute_coating_forces(cells: Cells, nodes, u) -> np.ndarray:
+    """Return the nodal forces (frames, N, 2) [N/m] by which coating cells at given nodes have displacements u [m]."""
+    out = np.zeros(u.shape)
+    for kind, group, numbers in number_cells(cells.groups):
+        # No other cell exerts a force of the coating on these nodes
+        group = group[cells.is_coating[numbers] & np.isin(group, nodes).any(axis=1)]
+        moduli = cells.layers.lame_constants(np.ones(len(group), bool))
+        stiffness = compute_stiffness(cells.points, group, ELEMENTS[kind], *moduli)
+        moved = u[:, group].reshape(*u.shape[:1], *stiffness.shape[:2], 1)
+        forces = (stiffness @ moved).reshape(len(u), *group.shape, 2)
+        np.add.at(out, (slice(None), group), forces)
     return out
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from ..core import NotConverged, frozen_array
 from ..formatting import format_length
 from ..mesh import pieces
-from ..mesh.elements import ELEMENTS, Element
-from .fronts import MIN_SAFE_PIVOT, CellBlock, Fronts, condense_to_interface
+from ..mesh.elements import ELEMENTS, Element, number_cells
+from .fronts import MIN_SAFE_PIVOT, Fronts, StiffCells, condense_to_interface
 
 # Cells whose stiffness is integrated at once: the terms of this many cells need 40 MB
 MAX_INTEGRATED_CELLS = 20_000
@@ -205,7 +205,7 @@ class Piece:
             is_fixed[(x == x.min()) | (x == x.max()), self.guided] = True
         try:
             condensed = condense_to_interface(
-                self._stiffness_blocks(),
+                self._compute_cells(),
                 mesh.cell_positions,
                 mesh.interface,
                 is_fixed,
@@ -222,22 +222,23 @@ class Piece:
         """Relative round-off error of the compliance [1], which is 0 before the piece is factorised."""
         return self.computed.get("round_off_error", 0.0)
 
-    def _stiffness_blocks(self) -> list[CellBlock]:
-        """Return the stiffness matrices of the cells, one CellBlock for each kind of element."""
-        out = []
-        constants = self.layers.lame_constants(self.mesh.is_coating)
-        n_cells = 0
-        for kind, cells in self.mesh.blocks.items():
-            lam, mu = constants[:, n_cells : n_cells + len(cells)]
-            n_cells += len(cells)
-            matrices = np.empty((len(cells), 2 * cells.shape[1], 2 * cells.shape[1]))
+    def _compute_cells(self) -> StiffCells:
+        """Return the stiffness matrices of all cells."""
+        mesh = self.mesh
+        lam, mu = self.layers.lame_constants(mesh.is_coating)
+        n_corners = max(cells.shape[1] for cells in mesh.blocks.values())
+        nodes = np.full((lam.size, n_corners), mesh.n_nodes)
+        matrices = np.zeros((lam.size, 2 * n_corners, 2 * n_corners))
+        for kind, cells, numbers in number_cells(mesh.blocks):
+            size = cells.shape[1]
+            nodes[numbers, :size] = cells
             for begin in range(0, len(cells), MAX_INTEGRATED_CELLS):
                 part = slice(begin, begin + MAX_INTEGRATED_CELLS)
-                matrices[part] = compute_stiffness(
-                    self.mesh.points, cells[part], ELEMENTS[kind], lam[part], mu[part]
+                rows = numbers[part]
+                matrices[rows, : 2 * size, : 2 * size] = compute_stiffness(
+                    mesh.points, cells[part], ELEMENTS[kind], lam[rows], mu[rows]
                 )
-            out.append(CellBlock(cells, matrices))
-        return out
+        return StiffCells(nodes, matrices)
 
     def solve(self, load) -> np.ndarray:
         """Return displacements (frames, N, 2) [m] under interface loads (m, 2, frames) [N/m]."""

@@ -26,10 +26,10 @@ MAX_UNREFINED_RESIDUAL = 1e-8
 MAX_REFINEMENT_CHANGE = 1e-2
 
 
-class CellBlock(NamedTuple):
-    """Cells of one element.
+class StiffCells(NamedTuple):
+    """Cells of one piece; those with fewer nodes than others have the node n, which does not exist, and zeros for it.
 
-    - nodes (t, k): node numbers.
+    - nodes (t, k): node numbers from 0 to n - 1, or n.
     - matrices (t, 2 k, 2 k): stiffnesses per unit width [N/m per m].
     """
 
@@ -58,7 +58,7 @@ class Front(NamedTuple):
 class Fronts:
     """Factors of the stiffness of a piece with n nodes, of which m lie on the interface.
 
-    - ``blocks``: cells, in which fixed displacements are decoupled
+    - ``cells``: cells, in which fixed displacements are decoupled
     - ``fronts``: fronts in the order of elimination; empty if only the compliance is wanted
     - ``interface``: (m,) nodes
     - ``compliance``: (2 m, 2 m) displacements of the interface per unit force on it [m2/N], node by node along x and
@@ -67,7 +67,7 @@ class Fronts:
     - ``smallest_pivot``: smallest pivot relative to the diagonal entry of its front
     """
 
-    blocks: list[CellBlock]
+    cells: StiffCells
     fronts: list[Front]
     interface: np.ndarray
     compliance: np.ndarray
@@ -93,11 +93,13 @@ class Fronts:
 
     def compute_forces(self, u) -> np.ndarray:
         """Return the nodal forces (n, 2, r) [N/m] that cause displacements of the same shape [m]."""
-        out = np.zeros_like(u)
-        for nodes, matrices in self.blocks:
-            local = u[nodes].reshape(len(nodes), -1, u.shape[-1])
-            np.add.at(out, nodes, (matrices @ local).reshape(*nodes.shape, 2, -1))
-        return out
+        nodes, matrices = self.cells
+        out = np.zeros((len(u) + 1, *u.shape[1:]))
+        out[:-1] = u
+        local = out[nodes].reshape(*matrices.shape[:2], -1)
+        out[:] = 0.0
+        np.add.at(out, nodes, (matrices @ local).reshape(*nodes.shape, 2, -1))
+        return out[:-1]
 
     def estimate_round_off(self) -> float:
         """Estimate the relative round-off error of the compliance from one step of iterative refinement.
@@ -136,69 +138,27 @@ class Fronts:
 
 
 class _Part(NamedTuple):
-    """Part of a mesh that consists of successive leaves.
+    """Part of a mesh, of which some nodes are eliminated.
 
-    - ``halves``: numbers of its two halves, () for a leaf
-    - ``first_leaf``, ``end_leaf``: first leaf, and last leaf + 1
-    """
-
-    halves: tuple[int, ...]
-    first_leaf: int
-    end_leaf: int
-
-
-class _Stiffness(NamedTuple):
-    """Stiffness of a part of a piece.
-
-    - nodes (k,): nodes of the part.
+    - nodes (k,): nodes that remain.
+    - counts (k,): number of cells of the part at each of them.
     - matrix (2 k + 2, 2 k + 2): stiffness [N/m per m]. Its last two rows and columns are zero.
     """
 
     nodes: np.ndarray
+    counts: np.ndarray
     matrix: np.ndarray
 
 
-def _bisect_cells(positions) -> tuple[list[_Part], list[np.ndarray]]:
-    """Halve cells at positions (t, 2) across the longer side of each part, until the parts (leaves) are small.
-
-    Returns
-    -------
-    parts : list of _Part
-        Both halves of a part stand before it.
-    leaves : list of ndarray
-        Cells of each leaf.
-    """
-    parts = []
-    leaves = []
-
-    def divide(cells) -> int:
-        """Divide cells, and return the number of their part."""
-        first_leaf = len(leaves)
-        halves = ()
-        if cells.size > MAX_LEAF_CELLS:
-            along = positions[cells]
-            along = along[:, np.argmax(np.ptp(along, axis=0))]
-            cut = np.partition(along, cells.size // 2)[cells.size // 2]
-            is_first = along < cut if (along < cut).any() else along <= cut
-            halves = (divide(cells[is_first]), divide(cells[~is_first]))
-        else:
-            leaves.append(cells)
-        parts.append(_Part(halves, first_leaf, len(leaves)))
-        return len(parts) - 1
-
-    divide(np.arange(len(positions)))
-    return parts, leaves
-
-
 def condense_to_interface(
-    blocks: list[CellBlock], positions, interface, is_fixed, *, keep_fronts: bool = True
+    cells: StiffCells, positions, interface, is_fixed, *, keep_fronts: bool = True
 ) -> Fronts:
     """Condense a mesh to its interface.
 
     Parameters
     ----------
-    blocks : list of CellBlock
-        Stiffnesses of the t cells, by element, in which the fixed displacements are then decoupled.
+    cells : StiffCells
+        Stiffnesses of the t cells, in which the fixed displacements are then decoupled.
     positions : (t, 2) ndarray
         Positions of the cells, by which they are divided.
     interface : (m,) ndarray of int
@@ -217,124 +177,112 @@ def condense_to_interface(
     NotConverged
         If the stiffness is not positive definite.
     """
-    # A node is eliminated in the smallest part that contains all of its cells
-    for block in blocks:
-        _decouple_fixed(block, is_fixed)
-    parts, leaves = _bisect_cells(positions)
-    first, last = _find_leaves_of_nodes(blocks, leaves, len(is_fixed))
-    last[interface] = len(leaves)  # these nodes belong to no part
-    position = np.empty(len(is_fixed) + 1, np.int64)
-
-    # Halves stand before their part, so their stiffnesses are ready when the part is reached
-    stiffnesses = {}
-    fronts = []
-    smallest_pivots = []
+    _decouple_fixed(cells, np.append(is_fixed, [[False, False]], axis=0))
+    elimination = _Elimination(cells, positions, interface, len(is_fixed), keep_fronts=keep_fronts)
     with use_one_blas_thread():
-        for number, part in enumerate(parts):
-            if part.halves:
-                terms = [stiffnesses.pop(half) for half in part.halves]
-            else:
-                terms = _select_cells(blocks, leaves[part.first_leaf])
-            nodes = _merge_nodes([term.nodes for term in terms])
-            is_own = (first[nodes] >= part.first_leaf) & (last[nodes] < part.end_leaf)
-            own = nodes[is_own]
-            boundary = nodes[~is_own]
-            # A last node that does not exist stands for those that a term does not contain
-            order = np.concatenate((own, boundary, [len(is_fixed)]))
-            add_terms = _add_stiffnesses if part.halves else _assemble_cells
-            matrix = add_terms(terms, order, position)
-            front, stiffnesses[number] = _eliminate(own, boundary, matrix)
-            smallest_pivots.append(front.smallest_pivot)
-            if keep_fronts:
-                fronts.append(front)
-
-        # The last stiffness is the Schur complement; its rows and columns are put in the order of the interface
-        nodes, schur = stiffnesses[len(parts) - 1]
-        position[nodes] = np.arange(nodes.size)
-        unknowns = _number_unknowns(position[interface])
+        # What remains of the whole mesh is the Schur complement; its rows are put in the order of the interface
+        nodes, _, schur = elimination.condense(np.arange(len(positions)))
+        unknowns = _number_unknowns(np.searchsorted(nodes, interface))
         factor, pivot = _factorise(schur.take(unknowns, 0).take(unknowns, 1))
         compliance = cho_inverse(factor)
-    smallest_pivot = min(pivot, *smallest_pivots)
-    return Fronts(blocks, fronts, interface, compliance, len(is_fixed), smallest_pivot)
+    smallest_pivot = min(pivot, elimination.smallest_pivot)
+    return Fronts(cells, elimination.fronts, interface, compliance, len(is_fixed), smallest_pivot)
 
 
-def _decouple_fixed(block: CellBlock, is_fixed) -> None:
-    """Decouple the fixed displacements in the stiffness of each cell of a block, with 1 on the diagonal.
+class _Elimination:
+    """Elimination of the inner nodes of a piece, part by part.
 
-    `is_fixed` (N, 2) tells which displacements are 0. Their rows and columns become 0.
+    Parameters
+    ----------
+    cells : StiffCells
+        Cells with n nodes.
+    positions : (t, 2) ndarray
+        Positions of the cells.
+    interface : (m,) ndarray of int
+        Nodes that remain.
+    n_nodes : int
+        Number n of nodes.
+    keep_fronts : bool
+        Whether `fronts` lists the fronts in the order of elimination.
     """
-    is_fixed = is_fixed[block.nodes].reshape(len(block.nodes), -1)
-    cells = np.flatnonzero(is_fixed.any(axis=1))
-    is_free = ~is_fixed[cells]
-    block.matrices[cells] *= is_free[:, :, None] & is_free[:, None]
+
+    def __init__(self, cells: StiffCells, positions, interface, n_nodes: int, *, keep_fronts: bool):
+        self.cells = cells
+        self.positions = positions
+        self.keep_fronts = keep_fronts
+        self.fronts = []
+        self.smallest_pivot = 1.0
+        # A node is eliminated in the smallest part that contains all of its cells
+        self.counts = np.bincount(cells.nodes.ravel(), minlength=n_nodes + 1)
+        self.counts[interface] += 1
+        self.position = np.empty(n_nodes + 1, np.int64)
+
+    def condense(self, members: np.ndarray) -> _Part:
+        """Return the part that consists of some cells after the elimination of its own nodes."""
+        # Large parts are halved across their longer side
+        if members.size > MAX_LEAF_CELLS:
+            along = self.positions[members]
+            along = along[:, np.argmax(np.ptp(along, axis=0))]
+            cut = np.partition(along, members.size // 2)[members.size // 2]
+            is_first = along < cut if (along < cut).any() else along <= cut
+            terms = [self.condense(members[is_first]), self.condense(members[~is_first])]
+            nodes = np.concatenate([term.nodes for term in terms])
+            counts = np.concatenate([term.counts for term in terms])
+            add_terms = _add_stiffnesses
+        else:
+            terms = StiffCells(self.cells.nodes[members], self.cells.matrices[members])
+            nodes = terms.nodes[terms.nodes < self.counts.size - 1]
+            counts = np.ones(nodes.size)
+            add_terms = _assemble_cells
+
+        # The different nodes; np.unique takes several times as long for few of them
+        different = np.sort(nodes)
+        different = different[np.diff(different, prepend=-1) > 0]
+        self.position[different] = np.arange(different.size)
+        counts = np.bincount(self.position[nodes], counts)
+        is_own = counts == self.counts[different]
+        own = different[is_own]
+        boundary = different[~is_own]
+
+        # A last node that does not exist stands for those that a term does not contain
+        order = np.concatenate((own, boundary, [self.counts.size - 1]))
+        front, matrix = _eliminate(own, boundary, add_terms(terms, order, self.position))
+        self.smallest_pivot = min(self.smallest_pivot, front.smallest_pivot)
+        if self.keep_fronts:
+            self.fronts.append(front)
+        return _Part(boundary, counts[~is_own], matrix)
+
+
+def _decouple_fixed(cells: StiffCells, is_fixed) -> None:
+    """Decouple the fixed displacements in the stiffness of each cell, with 1 on the diagonal.
+
+    `is_fixed` (n + 1, 2) tells which displacements are 0. Their rows and columns become 0.
+    """
+    is_fixed = is_fixed[cells.nodes].reshape(len(cells.nodes), -1)
+    held = np.flatnonzero(is_fixed.any(axis=1))
+    is_free = ~is_fixed[held]
+    cells.matrices[held] *= is_free[:, :, None] & is_free[:, None]
     cell, unknown = np.nonzero(is_fixed)
-    block.matrices[cell, unknown, unknown] = 1.0
+    cells.matrices[cell, unknown, unknown] = 1.0
 
 
-def _find_leaves_of_nodes(blocks, leaves, n_nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers (n_nodes,) of the first and the last leaf that contains a cell of each node.
-
-    A leaf is a smallest part of the mesh. `leaves` lists the cells of each leaf, numbered through all `blocks`
-    (CellBlock).
-    """
-    leaf = np.empty(sum(len(block.nodes) for block in blocks), np.int64)
-    for number, cells in enumerate(leaves):
-        leaf[cells] = number
-    first = np.full(n_nodes, len(leaves))
-    last = np.full(n_nodes, -1)
-    n_cells = 0
-    for nodes, _ in blocks:
-        of_cell = leaf[n_cells : n_cells + len(nodes), None]
-        n_cells += len(nodes)
-        np.minimum.at(first, nodes, of_cell)
-        np.maximum.at(last, nodes, of_cell)
-    return first, last
-
-
-def _select_cells(blocks, cells) -> list[CellBlock]:
-    """Return the given `cells`, which are numbered through all `blocks` (CellBlock), by element."""
-    selected = []
-    n_cells = 0
-    for nodes, matrices in blocks:
-        block_cells = cells[(cells >= n_cells) & (cells < n_cells + len(nodes))] - n_cells
-        n_cells += len(nodes)
-        selected.append(CellBlock(nodes[block_cells], matrices[block_cells]))
-    return selected
-
-
-def _merge_nodes(node_arrays) -> np.ndarray:
-    """Return the different nodes of several arrays of nodes, sorted.
-
-    `np.unique` takes several times as long for few nodes.
-    """
-    nodes = np.sort(np.concatenate(node_arrays, axis=None))
-    return np.concatenate((nodes[:-1][nodes[1:] > nodes[:-1]], nodes[-1:]))
-
-
-def _assemble_cells(blocks, nodes_in_order, position) -> np.ndarray:
-    """Return the stiffness (2 k, 2 k) [N/m per m] of cells for k nodes.
-
-    `blocks` are the cells by element, `nodes_in_order` (k,) are the nodes, and `position` (N + 1,) is a workspace for
-    the places of all N nodes in `nodes_in_order`.
-    """
-    position[nodes_in_order] = np.arange(nodes_in_order.size)
-    size = 2 * nodes_in_order.size
-    total = 0.0
-    for nodes, matrices in blocks:
-        unknowns = _number_unknowns(position[nodes])
-        entries = unknowns[:, :, None] * size + unknowns[:, None]
-        total = total + np.bincount(entries.ravel(), matrices.ravel(), size**2)
-    return total.reshape(size, size)
+def _assemble_cells(cells: StiffCells, order, position) -> np.ndarray:
+    """Return the stiffness (2 k, 2 k) [N/m per m] of cells for the nodes `order` (k,); see `_add_stiffnesses`."""
+    position[order] = np.arange(order.size)
+    unknowns = _number_unknowns(position[cells.nodes])
+    size = 2 * order.size
+    entries = unknowns[:, :, None] * size + unknowns[:, None]
+    return np.bincount(entries.ravel(), cells.matrices.ravel(), size**2).reshape(size, size)
 
 
 def _add_stiffnesses(terms, order, position) -> np.ndarray:
     """Return the sum (2 k, 2 k) [N/m per m] of the stiffnesses of two halves for k nodes.
 
-    `terms` are the `_Stiffness` of the halves, `order` (k,) are the nodes of the sum, and `position` (N + 1,) is a
+    `terms` are both halves, `order` (k,) are the nodes of the sum, and `position` (N + 1,) is a
     workspace for the places of all N nodes in a term.
     """
     total = None
-    for nodes, matrix in terms:
+    for nodes, _, matrix in terms:
         # Nodes that the term does not contain take the zeros in its last rows and columns
         position[order] = nodes.size
         position[nodes] = np.arange(nodes.size)
@@ -351,7 +299,7 @@ def _number_unknowns(nodes) -> np.ndarray:
     )
 
 
-def _eliminate(own_nodes, boundary, matrix) -> tuple[Front, _Stiffness]:
+def _eliminate(own_nodes, boundary, matrix) -> tuple[Front, np.ndarray]:
     """Eliminate the own nodes of a part.
 
     With K its stiffness, K_oo = L L^T, W = L^-1 K_ob and the Schur complement S = K_bb - W^T W.
@@ -367,8 +315,8 @@ def _eliminate(own_nodes, boundary, matrix) -> tuple[Front, _Stiffness]:
     -------
     front : Front
         L and W of the eliminated nodes.
-    remaining : _Stiffness
-        S of the boundary.
+    remaining : (2 b + 2, 2 b + 2) ndarray
+        S of the boundary and of the last node.
     """
     size = 2 * own_nodes.size
     own_boundary = matrix[:size, size:].copy()
@@ -384,7 +332,7 @@ def _eliminate(own_nodes, boundary, matrix) -> tuple[Front, _Stiffness]:
         dgemm(-1.0, coupling, coupling, beta=1.0, c=remaining.T, trans_b=1, overwrite_c=1)
 
     front = Front(own_nodes, boundary, factor, own_boundary[:, : 2 * boundary.size], smallest_pivot)
-    return front, _Stiffness(boundary, remaining)
+    return front, remaining
 
 
 def _factorise(matrix) -> tuple[np.ndarray, float]:

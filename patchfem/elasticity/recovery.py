@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import frozen_array
-from ..mesh.elements import ELEMENTS
+from ..mesh.elements import ELEMENTS, number_cells
 from .elasticity import CellPoints, Layers, Piece, compute_stress, evaluate_cells
 
 # Smallest determinant of the correlations of (1, x, y) for which a patch determines a plane; a
@@ -311,14 +311,12 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list[CellPoints]
         xx, yy, _, xy = stress[frame].T
         at_centres = np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear], axis=1)
         recovered = recovery(at_centres).T[:, recovery.recovery_point]
-        first_cell = first_corner = 0
-        for (kind, nodes), points in zip(cells.groups.items(), gauss_points):
+        first_corner = 0
+        for (kind, nodes, part), points in zip(number_cells(cells.groups), gauss_points):
             # Recovered components of the cells of one element, interpolated to the Gauss points
             n_corners = ELEMENTS[kind].n_corners
-            part = slice(first_cell, first_cell + len(nodes))
             end_corner = first_corner + n_corners * len(nodes)
             at_corners = recovered[:, first_corner:end_corner].reshape(3, len(nodes), n_corners)
-            first_cell = part.stop
             first_corner = end_corner
             shape = ELEMENTS_BY_CORNERS[n_corners].evaluate(ELEMENTS[kind].gauss).values
             at_points = at_corners @ shape.T

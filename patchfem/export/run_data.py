@@ -276,7 +276,10 @@ def _collect_regimes(result: Result) -> Variables:
     regimes = encode_texts("curve_point", curve["regime"], "regime of the steady motion")
     folds = np.asarray(curve.get("folds", ()), float)
     unit = "Hz" if np.ptp(curve["frequency"]) > 0 else "m s-2"
-    columns = {"curve_fold": (folds, unit)} if folds.size else {}
+    errors = np.asarray(curve.get("fold_errors", np.full(folds.size, np.nan)), float)
+    columns = (
+        {"curve_fold": (folds, unit), "curve_fold_error": (errors, unit)} if folds.size else {}
+    )
     return {"curve_regime": regimes} | make_variables("run", **columns)
 
 

@@ -127,13 +127,22 @@ def _describe_onset(result: Result, measures: Quantities) -> str:
 
 
 def _describe_peak(result: Result, measures: Quantities) -> str:
-    """Return the clause on the frequencies of the peak and of the folds of a response curve, or "" without a peak."""
+    """Return the clause on frequency and width of the peak of a response curve and on its folds, or "" without a peak."""
     peak = measures.get("peak_frequency")
     if peak is None or peak.value is None:
         return ""
-    folds = [format_quantity(fold, "Hz", 4) for fold in result.motion.steady.curve["folds"]]
-    folded = f" of a curve with folds at {', '.join(folds)}" if folds else " of the response curve"
-    return f"at the peak{folded}, {_format_measure('peak_frequency', measures)}"
+    curve = result.motion.steady.curve
+    folds = [
+        format_value(fold, error, unit="Hz")
+        for fold, error in zip(curve["folds"], curve["fold_errors"])
+    ]
+    place = _format_measure("peak_frequency", measures)
+    width = measures.get("peak_width")
+    if width is not None and width.value is not None:
+        place += f" with a half-power width of {_format_measure('peak_width', measures)}"
+    if folds:
+        return f"at the peak, {place}, of a curve with folds at {' and '.join(folds)}"
+    return f"at the peak of the response curve, {place}"
 
 
 def _choose_headline(result: Result, measures: Quantities) -> str:

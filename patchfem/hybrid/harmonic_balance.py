@@ -10,8 +10,8 @@ import numpy as np
 
 from ..core import ModalBasis
 from ..structure.response import compute_receptance
-from .cases import Case, make_arrays
-from .laws import masing
+from .cases import Case, Load, make_arrays
+from .laws import LAWS, masing
 from .records import Face, LawNumbers, Memory, Setting, State
 
 N_NODES = 48  # nodes of Gauss's rule over a branch of a loop, which is exact while no element slips
@@ -21,6 +21,8 @@ N_SUBSTITUTIONS = 60  # substitutions of the stiffness, each by half of its chan
 # Height of a maximum of the first-harmonic balance that is examined, relative to the highest steady motion. For the damper
 # of the template the balance exceeds it by up to 70 %, and falls short of it by 7 %.
 MIN_HEIGHT_RATIO = 0.5
+# Stretch of the element that stands for rigid friction, relative to the slide without friction
+RIGID_STRETCH_RATIO = 1e-2
 SUBSTITUTION_TOL = 1e-3  # relative change of all stiffnesses at which the substitutions end
 
 
@@ -39,7 +41,7 @@ class BalancedMotions(NamedTuple):
     def make_start(self, case: Case) -> State:
         """Return the state at the start of a period of a case, interpolated to its frequency.
 
-        The laws remember the loop between both reversals of the slide.
+        Elements remember the loop between both reversals of the slide.
         """
         state = make_arrays(case)[0]
         n = self.modes.shape[1]
@@ -51,6 +53,8 @@ class BalancedMotions(NamedTuple):
         state.y[:n] = modes.imag
         state.y[n : 2 * n] = omega * modes.real
         for face, memory, slide in zip(case.rig.faces, state.memory, slides):
+            if LAWS[int(face[Face.LAW])] != "masing":
+                continue
             memory[Memory.COUNT] = 0
             memory[Memory.DIRECTION] = 1.0 if slide.real >= 0 else -1.0
             ends = (-abs(slide), abs(slide))
@@ -58,15 +62,17 @@ class BalancedMotions(NamedTuple):
         return state
 
 
-def balance_first_harmonic(modes: ModalBasis, laws, acceleration: float, omega) -> BalancedMotions:
-    """Balance the first harmonic of the motions of a rig whose interfaces are parallel elements under constant loads.
+def balance_first_harmonic(
+    modes: ModalBasis, joints, acceleration: float, omega
+) -> BalancedMotions:
+    """Balance the first harmonic of the motions of a rig whose interfaces have constant loads.
 
     Parameters
     ----------
     modes : ModalBasis
         Modes of the structure without the contact.
-    laws : sequence of LawNumbers
-        (i,) laws "masing".
+    joints : sequence of (LawNumbers, Load)
+        (i,) laws of parallel elements or of rigid friction, and loads. Rigid friction counts as a stiff element.
     acceleration : float
         Amplitude of the drive [m s-2].
     omega : (k,) array
@@ -79,11 +85,12 @@ def balance_first_harmonic(modes: ModalBasis, laws, acceleration: float, omega) 
     """
     rows = modes.interfaces
     n = modes.omega.size
-    n_laws = len(laws)
+    n_laws = len(joints)
     forces = np.vstack([rows, -modes.mass * acceleration * modes.base])
     receptance = compute_receptance(modes, omega, np.eye(n), forces)
     at_interfaces = rows @ receptance
     largest = np.abs(at_interfaces[:, :, n_laws]).max(axis=0)
+    laws = [_soften(*joint, size) for joint, size in zip(joints, largest)]
     tables = [_tabulate_stiffness(law, size) for law, size in zip(laws, largest)]
 
     # U = (I + G K)^-1 d with the receptance G of the interfaces and the slides d without friction
@@ -99,6 +106,14 @@ def balance_first_harmonic(modes: ModalBasis, laws, acceleration: float, omega) 
             break
     loads = np.column_stack([-stiffness * slides, np.ones(len(omega))])
     return BalancedMotions(omega, (receptance @ loads[:, :, None])[:, :, 0], slides)
+
+
+def _soften(law: LawNumbers, load: Load, largest: float) -> LawNumbers:
+    """Return an element in place of rigid friction under a load, which sticks below a part of the largest slide [m]."""
+    if law.law == "masing":
+        return law
+    length = RIGID_STRETCH_RATIO * largest
+    return masing.from_elements([law.numbers[1] * load.mean / length], [length])
 
 
 class _StiffnessTable(NamedTuple):

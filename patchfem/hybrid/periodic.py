@@ -98,6 +98,11 @@ class PeriodicMotion(NamedTuple):
         return float(self.run.case.rig.settings[Setting.PERIOD])
 
     @property
+    def start(self) -> "Start":
+        """Start of the search for a similar motion."""
+        return Start(self.run.final, self.map)
+
+    @property
     def is_stable(self) -> bool:
         """Whether all multipliers are within the unit circle."""
         return bool(np.abs(self.multipliers).max(initial=0.0) < MAX_STABLE_MULTIPLIER)
@@ -110,6 +115,7 @@ def find_periodic_motion(
     start: State | None = None,
     has_kinks: bool = False,
     is_undamped: bool = False,
+    odd_laws: Sequence[LawNumbers] = (),
 ) -> PeriodicMotion:
     """Find the periodic motion that follows some first cycles of a case.
 
@@ -127,6 +133,8 @@ def find_periodic_motion(
     is_undamped : bool
         Whether a free motion without friction does not decay. A motion from rest that grows for ever is then found first,
         because the periods of a growing motion would lead nowhere.
+    odd_laws : sequence of LawNumbers
+        Laws of a rig whose motions are symmetric, see `Shooting`.
 
     Raises
     ------
@@ -134,7 +142,7 @@ def find_periodic_motion(
         If the search needs too many steps.
     """
     growth = _measure_growth(case) if is_undamped and start is None else None
-    shooting = Shooting(case)
+    shooting = Shooting(case, odd_laws)
     if start is not None:
         shooting.state = start
     if growth is None or not growth.size:
@@ -145,7 +153,7 @@ def find_periodic_motion(
         try:
             motion = _search(shooting, n_first, N_RELAXED, has_kinks=has_kinks)
         except NotConverged:
-            shooting = Shooting(case)
+            shooting = Shooting(case, odd_laws)
             before = shooting.state
             shooting.relax(1)
             change = shooting.measure_change(before)
@@ -215,7 +223,7 @@ def _search(
 
 
 def follow_periodic_motion(
-    case: Case, near: PeriodicMotion | State, odd_laws: Sequence[LawNumbers] = ()
+    case: Case, start: "Start", odd_laws: Sequence[LawNumbers] = ()
 ) -> PeriodicMotion:
     """Find the periodic motion of a case from that of a similar case, without its stability and the error of its state.
 
@@ -226,8 +234,8 @@ def follow_periodic_motion(
     ----------
     case : Case
         Its start and schedule are not used.
-    near : PeriodicMotion or State
-        Similar motion that does not grow, or a state near the start of the motion.
+    start : Start
+        State near the start of the motion, and the derivatives of a similar one.
     odd_laws : sequence of LawNumbers
         Laws of a rig whose motions are symmetric, see `Shooting`.
 
@@ -238,10 +246,7 @@ def follow_periodic_motion(
         only after hundreds of periods.
     """
     shooting = Shooting(case, odd_laws)
-    if isinstance(near, PeriodicMotion):
-        shooting.map = near.map
-        near = near.run.final
-    shooting.state = near
+    shooting.state, shooting.map = start
     shooting.relax(1)
     tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
     before, change = shooting.converge(tolerance, N_RELAXED, MAX_KINKED_CHANGE)
@@ -259,6 +264,28 @@ def follow_periodic_motion(
         shooting.n_periods,
         map=shooting.map,
     )
+
+
+class Start(NamedTuple):
+    """State from which a search for a periodic motion begins, and the derivatives of the map of a period near it."""
+
+    state: State
+    map: "PeriodMap | None" = None
+
+    def interpolate(self, other: "Start", fraction: float) -> "Start":
+        """Return the start at a fraction of the way to that of another motion.
+
+        It is the nearer one where the laws are in different regimes, or remember different numbers of reversal points.
+        """
+        near = self if fraction < 0.5 else other
+        first, second = self.state, other.state
+        columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG, Memory.COUNT]
+        if not np.array_equal(first.memory[:, columns], second.memory[:, columns]):
+            return near
+        state = copy_state(near.state)
+        for target, low, high in zip(state[:2], first, second):
+            target[...] = (1 - fraction) * low + fraction * high
+        return near._replace(state=state)
 
 
 class _Growth(NamedTuple):
@@ -563,16 +590,27 @@ class Shooting:
         stack[:] = packed[self.n :].reshape(stack.shape)
         return state
 
-    def find_unknowns(self, before: State) -> np.ndarray:
-        """Return the indices of the unknowns in the packed state: what a period changes."""
-        is_unknown = self.pack(self.state) != self.pack(before)
-        is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
-
-        # Reversal points count if their number is the same.
+    def find_usable(self, before: State) -> np.ndarray:
+        """Return which entries (k,) of the packed state may be unknowns: not reversal points that come or go in a period."""
         counts = before.memory[:, Memory.COUNT, None]
         is_used = np.arange(before.memory.shape[1] - Memory.STACK) < 2 * counts
         is_used &= counts == self.state.memory[:, Memory.COUNT, None]
-        is_unknown[self.n :] &= is_used.ravel()
+        return np.append(np.ones(self.n, bool), is_used)
+
+    def find_unknowns(self, before: State) -> np.ndarray:
+        """Return the indices of the unknowns in the packed state: what a period changes.
+
+        Those of the known derivatives are kept, as long as they contain all that changes.
+        """
+        usable = self.find_usable(before)
+        is_unknown = self.pack(self.state) != self.pack(before)
+        is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
+        is_unknown &= usable
+        if self.map is not None and usable[self.map.columns].all():
+            is_known = np.zeros(usable.size, bool)
+            is_known[self.map.columns] = True
+            if not (is_unknown & ~is_known).any():
+                return self.map.columns
         return np.flatnonzero(is_unknown)
 
     def differentiate(self, before: State) -> tuple["PeriodMap", np.ndarray]:
@@ -626,7 +664,10 @@ class Shooting:
             return np.full(change.size, np.nan), np.inf
         # A state that nothing determines, such as that of an interface at rest, has no error.
         step = _solve_newton(found, change, NEUTRAL_TOL)
-        return np.linalg.eigvals(found.slopes), float(np.abs(step).max(initial=0.0))
+        multipliers = np.linalg.eigvals(found.slopes)
+        return multipliers**2 if self.odd_laws else multipliers, float(
+            np.abs(step).max(initial=0.0)
+        )
 
     def correct(self, before: State) -> None:
         """Replace the state by a Newton step from another one, which a period takes to it.

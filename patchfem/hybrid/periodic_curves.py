@@ -124,18 +124,24 @@ class ExtendedShooting(Shooting, ABC):
         state = super().unpack(aligned, packed)
         return state._replace(memory=_align(state.memory, -1))
 
+    def find_usable(self, before: State) -> np.ndarray:
+        """Return which entries (k,) of the packed state may be unknowns: all displacements at the ends of a loop.
+
+        The forces there follow from the displacements beside them.
+        """
+        is_used = _find_used(before) & _find_used(self.state)
+        is_used &= _align(before.memory, 1)[:, Memory.STACK :] != 0
+        is_used[:, 1::2] = False
+        return np.append(np.ones(self.n, bool), is_used)
+
     def find_unknowns(self, before: State) -> np.ndarray:
         """Return the indices of the unknowns in the packed state: what a period changes, and all points of a loop.
 
-        A periodic motion leaves the reversal points of its loop as they were, but they move with it. Their forces follow
-        from the displacements beside them.
+        A periodic motion leaves the reversal points of its loop as they were, but they move with it.
         """
-        start = self.pack(before)
-        is_unknown = self.pack(self.state) != start
+        is_unknown = self.find_usable(before)
+        is_unknown[: self.n] = self.state.y[: self.n] != before.y[: self.n]
         is_unknown[: 2 * self.case.rig.modes.shape[1]] = True
-        is_used = _find_used(before) & _find_used(self.state)
-        is_unknown[self.n :] = is_used.ravel() & (start[self.n :] != 0)
-        is_unknown[self.n + 1 :: 2] = False
         is_unknown[self.extra] = True
         return np.flatnonzero(is_unknown)
 
@@ -204,7 +210,7 @@ class CurvePath:
     """Curve of periodic motions.
 
     - points: list of PathPoint in order of arc length
-    - folds: parameters at the folds, from a cubic between neighbouring points
+    - folds, fold_errors: parameters at the folds, from a cubic between neighbouring points, and their errors
     - ended: "end" at the bound in the first direction; "start" if the curve returned to the other bound; "loop" if it has
       closed; "points" after the largest number of points; "step" if no step was short enough; "cost" if its motions have
       taken too many steps
@@ -212,6 +218,7 @@ class CurvePath:
 
     points: list[PathPoint]
     folds: tuple[float, ...]
+    fold_errors: tuple[float, ...]
     ended: str
 
 
@@ -401,7 +408,7 @@ class MotionCurve(ExtendedShooting):
         unit = np.full(w.size, float(np.linalg.norm(w[:-1])) or 1.0)
         unit[-1] = high - low
         direction = np.append(np.zeros(w.size - 1), 1.0 if forward else -1.0)
-        folds: list[float] = []
+        folds: list[tuple[float, float]] = []
         step = settings.first_step
         ended = "points"
 
@@ -442,7 +449,8 @@ class MotionCurve(ExtendedShooting):
                 step = min(step * _step_factor(n_periods), settings.max_step)
         except NotConverged:
             ended = "cost"
-        return CurvePath(points, tuple(folds), ended)
+        values, errors = tuple(zip(*folds)) or ((), ())
+        return CurvePath(points, values, errors, ended)
 
     def find_between(
         self, first: PathPoint, second: PathPoint, fraction: float, width: float
@@ -516,10 +524,13 @@ def _is_on_curve(point: PathPoint, points: list[PathPoint], direction, unit) -> 
     return bool((is_between & is_parallel).any())
 
 
-def _find_folds(points: list[PathPoint], tangents, unit, length: float) -> list[float]:
-    """Return the parameter at a fold between two points that follow each other, [] without a fold.
+def _find_folds(
+    points: list[PathPoint], tangents, unit, length: float
+) -> list[tuple[float, float]]:
+    """Return the parameter at a fold between two points that follow each other, and its error, [] without a fold.
 
-    The parameter is a cubic of the distance along the tangent at the first point, and a fold is its extreme.
+    The parameter is a cubic of the distance along the tangent at the first point, and a fold is its extreme. The error is
+    the largest distance from the extremes of the parabolas that have one of the points and both slopes.
 
     Parameters
     ----------
@@ -536,10 +547,15 @@ def _find_folds(points: list[PathPoint], tangents, unit, length: float) -> list[
     if slopes[0] * slopes[1] >= 0:
         return []
     slopes[1] /= max(float(tangents[0] @ tangents[1]), MIN_TANGENT_COSINE)
-    parameters = [point.w[-1] for point in points]
-    curve = CubicHermiteSpline([0.0, length], parameters, slopes * unit[-1])
+    slopes *= unit[-1]
+    parameters = np.array([point.w[-1] for point in points])
+    curve = CubicHermiteSpline([0.0, length], parameters, slopes)
     places = curve.derivative().roots(extrapolate=False)
-    return [float(curve(place)) for place in places[:1]]
+    extremes = parameters + 0.5 * slopes * np.array([1, -1]) * length * slopes / np.ptp(slopes)
+    if not places.size:
+        return []
+    fold = float(curve(places[0]))
+    return [(fold, float(np.abs(extremes - fold).max()))]
 
 
 def find_unit(first: PathPoint, second: PathPoint, width: float) -> np.ndarray:

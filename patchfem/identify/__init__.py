@@ -13,6 +13,5 @@ PUBLIC = {
         "identify_decay_modes",
         "identify_driven_modes",
     ),
-    "fit_sentences": ("describe_fit",),
-    "advice": ("advise_test",),
+    "fit_sentences": ("advise_test", "describe_fit"),
 }

@@ -1,22 +1,21 @@
-"""95 % confidence intervals of a least-squares fit, from the Jacobian or from the profile.
+"""95 % confidence intervals of a least-squares fit.
 
-The profile of the sum of squares is used if the residual is not linear over the interval.
+An end of an interval is where the sum of squares, minimized over the other parameters, has grown by t^2 times the variance
+of a row. Steps with the linearized residual find it (Venzon and Moolgavkar, Applied Statistics 37, 87, 1988); the first of
+them leads to the end of the linear interval, which counts if the sum of squares grows nearly as expected on this way.
 """
 
-from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import null_space
-from scipy.optimize import brentq
+from scipy.optimize import brentq, lsq_linear
 from scipy.special import stdtrit
 
-from .correlation import estimate_effective_rows
-from .descent import descend
-from .space import UnitCubeResidual
+from .descent import LinearModel, UnitCubeResidual
 
 # Smallest singular value of a determined direction, relative to the largest one of the scaled Jacobian.
 MIN_SINGULAR_VALUE = 1e-6
@@ -24,16 +23,20 @@ MIN_SINGULAR_VALUE = 1e-6
 MIN_RESIDUAL_EFFECT = 1e-9
 # Largest squared component of a determined parameter in an undetermined direction.
 MIN_DIRECTION_COMPONENT = 1e-3
-# Largest relative deviation of the sum of squares from a linear model at the ends of an interval; beyond it, the
-# profile is used.
+# Largest relative deviation of the growth of the sum of squares from that of a linear model at the end of an interval;
+# beyond it, the profile is followed.
 MAX_NONLINEARITY = 0.2
 # Smallest half-width of an interval above round-off, relative to the range of the parameter.
 MIN_INTERVAL_HALF_WIDTH = 1e-9
-# Ratio of the distance to the bound to the first step of a profile, for a parameter without a linear interval.
-N_FIRST_STEPS_TO_BOUND = 64
-PROFILE_END_TOL = 1e-3  # tolerance of the end of a profile interval, relative to its half-width
-# Growth at a point without a residual, relative to that at the end of the interval
-MAX_SQUARES_GROWTH_RATIO = 1e6
+PROFILE_END_TOL = 1e-3  # tolerance of the end of a profile, relative to its half-width
+MAX_PROFILE_STEPS = 60  # steps to the end of a profile; about four suffice
+# Largest deviation of the growth from the predicted one, relative to that at the end, of a step that is taken
+MAX_GROWTH_DEVIATION = 0.5
+MIN_CORRELATED_ROWS = 20  # smallest number of rows for a significant correlation
+# Largest correlation that is attributed to chance, in standard deviations 1/sqrt(rows) of independent rows.
+CHANCE_CORRELATION_FACTOR = 2.0
+# Smallest correlation between cycles at which they count as repetitions of the same error.
+MIN_CYCLE_CORRELATION = 0.5
 
 
 class IntervalKind(StrEnum):
@@ -82,82 +85,118 @@ class FitIntervals:
         return np.linalg.pinv(self.shifts / np.maximum(scale, 1e-300))
 
 
-class _Minimum(NamedTuple):
-    """Minimum of a least-squares fit for which confidence intervals are computed.
+class _End(NamedTuple):
+    """End of an interval: distance from the minimum in the unit cube, infinite at a bound; whether it is the linear one."""
 
-    - model: residual as a function on the unit cube.
-    - u: minimum (n,) in the unit cube.
-    - cost: sum of squares at the minimum.
-    - growth: growth of the sum of squares at the ends of a 95 % interval.
+    distance: float
+    is_linear: bool
+
+
+def _find_end(start: LinearModel, k: int, sign: float, growth: float, tolerance: float) -> _End:
+    """Find one end of the confidence interval of a parameter.
+
+    Parameters
+    ----------
+    start : LinearModel
+        Residual near the minimum, whose free coordinates are those with an effect.
+    k : int
+        Coordinate.
+    sign : float
+        Side, -1 or 1.
+    growth : float
+        Growth of the sum of squares at the end.
+    tolerance : float
+        Largest relative deviation of the growth at the first step from that of a linear model, at which it is the end.
     """
+    minimum = start.u
+    end = minimum[k] if sign < 0 else 1 - minimum[k]
+    if not end:
+        return _End(np.inf, False)
+    linear = copy(start)
+    cost = start.cost
+    trust = 1.0
+    for count in range(MAX_PROFILE_STEPS):
+        point, predicted = _predict_end(linear, k, sign, cost + growth, trust)
+        step = sign * (point[k] - linear.u[k])
+        distance = sign * (point[k] - minimum[k])
+        is_at_bound = point[k] in (0.0, 1.0)
 
-    model: UnitCubeResidual
-    u: np.ndarray
-    cost: float
-    growth: float
+        # a bound ends the search if the sum of squares is smaller there than at the end of an interval
+        if (
+            abs(step) <= PROFILE_END_TOL * distance
+            and count
+            and np.abs(point - linear.u).max() < trust
+        ):
+            is_open = is_at_bound and linear.cost < cost + growth * (1 - PROFILE_END_TOL)
+            return _End(np.inf if is_open else distance, False)
+        residual = linear.model(point)
+        deviation = np.inf
+        if residual is not None:
+            deviation = abs(residual @ residual - predicted) / growth
+        is_inside = ((point > 0) & (point < 1)).all()
+        if not count and is_inside and deviation <= tolerance:
+            return _End(distance, True)
+        if deviation > MAX_GROWTH_DEVIATION:
+            trust = np.abs(point - linear.u).max() / 2
+            if not linear.is_fresh:
+                linear.differentiate()
+            continue
+        linear.move(point, residual)
+        trust *= 2
+    return _End(sign * (linear.u[k] - minimum[k]), False)
 
-    def is_linear(self, direction) -> bool:
-        """Return whether the sum of squares at u - direction and u + direction is that of a linear model.
 
-        `direction` (n,) is a step in the unit cube to the end of a linear interval.
-        """
-        for end in (self.u - direction, self.u + direction):
-            if (end < 0).any() or (end > 1).any():
-                return False
-            growth = self.model.sum_of_squares(end) - self.cost
-            if not abs(growth / self.growth - 1) <= MAX_NONLINEARITY:
-                return False
-        return True
+def _predict_end(
+    linear: LinearModel, k: int, sign: float, target: float, trust: float
+) -> tuple[np.ndarray, float]:
+    """Return the point (n,) of a linear model at which its profile of a coordinate has a given value, and this value.
 
-    def find_profile_end(self, k: int, sign: float, step: float, others: Sequence[int]) -> float:
-        """Find one end of the confidence interval of parameter k.
+    The profile is the sum of squares, minimized over the other coordinates. Where it stays below the value, the point is
+    the last one in the direction.
 
-        There the sum of squares, minimized over the `others`, has grown by `growth`. The root of the growth is nearly
-        linear. Returns infinity if the interval reaches the bound.
+    Parameters
+    ----------
+    linear : LinearModel
+    k : int
+        Coordinate.
+    sign : float
+        Direction, -1 or 1.
+    target : float
+        Value of the profile.
+    trust : float
+        Largest change of a coordinate.
+    """
+    factor = linear.compress()
+    place = linear.free.index(k)
+    bounds = linear.limit(trust)
+    others = np.delete(factor[:, :-1], place, axis=1)
+    other_bounds = np.delete(bounds, place, axis=1)
+    step = np.zeros(len(linear.free))
 
-        Parameters
-        ----------
-        k : int
-            Number of the parameter.
-        sign : float
-            Side, -1 or 1.
-        step : float
-            First step in the unit cube.
-        others : sequence of int
-            Parameters that have an effect.
-        """
-        nearby = self.u
-        max_step = self.u[k] if sign < 0 else 1 - self.u[k]
+    def profile(change: float) -> float:
+        """Return the excess of the profile over its value at the end, after a change of the coordinate."""
+        step[place] = change
+        column = factor[:, -1] + factor[:, place] * change
+        if not others.size:
+            return column @ column - target
+        found = lsq_linear(others, -column, other_bounds, method="bvls")
+        step[np.arange(step.size) != place] = found.x
+        return 2 * found.cost - target
 
-        # A value is kept, because the descent from another point may end in another minimum, so that the ends of the bracket
-        # would have equal signs.
-        @cache
-        def compute_excess(step: float) -> float:
-            """Return the root of the relative growth minus 1 at a step of parameter k."""
-            nonlocal nearby
-            point = nearby.copy()
-            point[k] = self.u[k] + sign * step
-            descent = descend(self.model, point, others)
-            if descent.cost < np.inf:
-                nearby = descent.u
-            growth = max(descent.cost - self.cost, 0.0) / self.growth
-            return np.sqrt(min(growth, MAX_SQUARES_GROWTH_RATIO)) - 1
-
-        # the step is doubled until the end is bracketed
-        low = 0.0
-        high = min(step, max_step)
-        while not max_step or compute_excess(high) < 0:
-            if high >= max_step:
-                return np.inf
-            low = high
-            high = min(2 * high, max_step)
-        if not low:
-            nearby = self.u
-        return brentq(compute_excess, low, high, xtol=PROFILE_END_TOL * (low or high / 4))
+    # the profile of a linear model is convex; its smallest value is that over all coordinates
+    lowest = lsq_linear(factor[:, :-1], -factor[:, -1], bounds, method="bvls").x[place]
+    last = bounds[1, place] if sign > 0 else bounds[0, place]
+    change = last
+    if profile(lowest) >= 0:
+        change = lowest
+    elif profile(last) > 0:
+        change = brentq(profile, lowest, last, rtol=1e-9)
+    excess = profile(change)
+    return linear.propose(step), target + excess
 
 
 def compute_intervals(
-    model: UnitCubeResidual, u: np.ndarray, cost: float, kind: str
+    model: UnitCubeResidual, u: np.ndarray, kind: str = IntervalKind.ROWS
 ) -> FitIntervals:
     """Compute the 95 % confidence intervals of the parameters of a least-squares fit.
 
@@ -169,8 +208,6 @@ def compute_intervals(
         Residual as a function on the unit cube.
     u : (n,) ndarray
         Minimum in the unit cube.
-    cost : float
-        Sum of squares at the minimum.
     kind : str
         Value of `IntervalKind`.
 
@@ -179,119 +216,131 @@ def compute_intervals(
     FitIntervals
     """
     n = u.size
-    rows = estimate_effective_rows(model(u)) if kind == IntervalKind.SERIES else model.rows
+    linear = LinearModel(model, u, range(n))
+    rows = estimate_effective_rows(linear.residual) if kind == IntervalKind.SERIES else model.rows
     dof = max(rows - n, 1)
     # An exact fit has the cost of its round-off, so that variances are not zero.
-    cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
-    variance = cost / dof
+    variance = max(linear.cost, model.floor) / dof
     if kind == IntervalKind.KNOWN:
         dof = np.inf
         variance = 1.0
-    quantile = stdtrit(dof, 0.975)
-    minimum = _Minimum(model, u, cost, quantile**2 * variance)
+    growth = stdtrit(dof, 0.975) ** 2 * variance
 
-    # Covariance (J^T J)^-1 times the variance of a row, of the parameters that have an effect and lie on no bound. A
-    # parameter is unknown if a direction without effect on the residual contains it.
-    jacobian = model.jacobian(u, range(n))
+    # Shifts (J^T J)^-1 J^T of the parameters that have an effect and lie on no bound. A parameter is unknown if a direction
+    # without effect on the residual contains it.
+    jacobian = np.nan_to_num(linear.jacobian)
     norms = np.linalg.norm(jacobian, axis=0)
     has_effect = norms > MIN_RESIDUAL_EFFECT * model.largest * np.sqrt(model.rows)
-    free = np.flatnonzero((u > 0) & (u < 1) & has_effect)
-    inverse, null_vectors = _invert_normal_matrix(jacobian[:, free], norms[free])
+    on_bound = (u <= 0) | (u >= 1)
+    free = np.flatnonzero(~on_bound & has_effect)
+    scaled = jacobian[:, free] / norms[free]
+    null_vectors = np.zeros((0, free.size))
+    shifts = np.zeros((n, model.rows))
+    if free.size:
+        null_vectors = null_space(scaled, rcond=MIN_SINGULAR_VALUE).T
+        shifts[free] = np.linalg.pinv(scaled, rcond=MIN_SINGULAR_VALUE) / norms[free, None]
     covariance = np.full((n, n), np.nan)
-    covariance[np.ix_(free, free)] = inverse * variance
+    covariance[np.ix_(free, free)] = shifts[free] @ shifts[free].T * variance
     is_unknown = np.zeros(n, bool)
     is_unknown[free] = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
-
-    # Shift (J^T J)^-1 J^T of the parameters by a change of each row, from the unit cube to their units
-    shifts = np.zeros((n, model.rows))
-    shifts[free] = inverse @ jacobian[:, free].T
+    covariance[is_unknown] = covariance[:, is_unknown] = np.nan
+    deviation = np.sqrt(np.diag(covariance))
 
     # A parameter on a bound is shifted as if it were free: e / |e|^2 with the part e of its column that the free parameters
     # do not compensate.
-    for k in np.flatnonzero(((u <= 0) | (u >= 1)) & has_effect):
+    for k in np.flatnonzero(on_bound & has_effect):
         effect = jacobian[:, k] - jacobian[:, free] @ (shifts[free] @ jacobian[:, k])
         size = np.linalg.norm(effect)
         if size > MIN_SINGULAR_VALUE * norms[k]:
             shifts[k] = effect / size**2
-    shifts *= model.space.derivatives(u)[:, None]
 
-    # Linear interval u_k +- t sqrt(cov_kk). To its end the other free parameters change by the multiple cov_ik/cov_kk of
-    # u_k; if the sum of squares does not grow as expected on this line, or if u_k is on a bound, its profile is followed.
-    half_width = quantile * np.sqrt(np.diag(covariance))
-    offsets = np.full((2, n), np.nan)
+    # Known errors are stated by their ends, which only the profile reproduces. Data that exclude neither bound do not
+    # determine a parameter.
+    ends = np.full((n, 2), np.nan)
     open_ends = np.zeros((n, 2), bool)
     methods = np.full(n, "none", object)
+    linear.free = np.flatnonzero(has_effect).tolist()
+    linear.jacobian = linear.jacobian[:, has_effect]
     for k in np.flatnonzero(has_effect & ~is_unknown):
-        steps = np.full(2, half_width[k])
-        methods[k] = "linear"
-        direction = np.zeros(n)
-        if k in free:
-            direction[free] = half_width[k] * covariance[k, free] / covariance[k, k]
-        # known errors are stated by their ends, which only the profile reproduces
-        if k not in free or (
-            half_width[k] >= MIN_INTERVAL_HALF_WIDTH
-            and (kind == IntervalKind.KNOWN or not minimum.is_linear(direction))
-        ):
-            methods[k] = "profile"
-            others = [other for other in np.flatnonzero(has_effect) if other != k]
-            bounds = np.array([u[k], 1 - u[k]])
-            first = half_width[k] if half_width[k] > MIN_INTERVAL_HALF_WIDTH else 0.0
-            for side, sign in enumerate((-1.0, 1.0)):
-                step = first or bounds[side] / N_FIRST_STEPS_TO_BOUND
-                steps[side] = minimum.find_profile_end(k, sign, step, others)
-            open_ends[k] = ~np.isfinite(steps)
-            steps = np.minimum(steps, bounds)
-
-        # data that exclude neither bound do not determine the parameter
+        half_width = np.sqrt(growth / variance) * deviation[k]
+        found = [_End(half_width, True)] * 2
+        if not half_width < MIN_INTERVAL_HALF_WIDTH:
+            is_exact = on_bound[k] or kind == IntervalKind.KNOWN
+            tolerance = 0.0 if is_exact else MAX_NONLINEARITY
+            found = [_find_end(linear, k, sign, growth, tolerance) for sign in (-1.0, 1.0)]
+        distances = np.array([one.distance for one in found])
+        open_ends[k] = ~np.isfinite(distances)
         if open_ends[k].all():
-            methods[k] = "none"
             continue
-        offsets[:, k] = steps
-    ends = [model.space.to_values(u - offsets[0]), model.space.to_values(u + offsets[1])]
+        methods[k] = "linear" if all(one.is_linear for one in found) else "profile"
+        for side, distance in enumerate(np.minimum(distances, [u[k], 1 - u[k]])):
+            point = u.copy()
+            point[k] += (-distance, distance)[side]
+            ends[k, side] = model.space.to_values(point)[k]
 
     # Correlations cov_ij/sqrt(cov_ii cov_jj), without the parameters that the data do not determine
-    covariance[is_unknown] = np.nan
-    covariance[:, is_unknown] = np.nan
-    scale = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = covariance / np.outer(scale, scale)
+        correlation = covariance / np.outer(deviation, deviation)
+
+    # Undetermined directions, relative to the values or, if one of these is 0, to the ranges, with a largest component of 1
+    values = model.space.to_values(u)
+    slopes = model.space.derivatives(u)
+    scale = values if values[free].all() else model.space.high - model.space.low
+    unknown = np.zeros((len(null_vectors), n))
+    unknown[:, free] = null_vectors / norms[free] * slopes[free] / scale[free]
+    for row in unknown:
+        row /= row[np.argmax(np.abs(row))]
+        row[np.abs(row) < 1e-3] = 0.0
     return FitIntervals(
-        ends=np.transpose(ends),
+        ends=ends,
         methods=tuple(methods),
         open_ends=open_ends,
         correlation=correlation,
         sensitivity=norms / np.sqrt(model.rows),
-        shifts=shifts,
-        unknown=_list_unknown_directions(model, u, free, null_vectors / norms[free]),
+        shifts=shifts * slopes[:, None],
+        unknown=unknown,
         rows=rows,
     )
 
 
-def _invert_normal_matrix(jacobian, norms) -> tuple[np.ndarray, np.ndarray]:
-    """Invert the normal matrix J^T J in the subspace that the data determine.
+def estimate_effective_rows(residual) -> float:
+    """Estimate the effective number of independent rows of a residual.
 
-    Returns the pseudo-inverse (f, f), and the unit vectors (d, f) of its null space. `norms`
-    (f,) are the norms of the columns of J.
+    The number is n/tau, with tau = 1 + 2 sum rho_k over the lags k up to the first zero of the correlation
+    (Geyer, Statistical Science 7, 473, 1992). If m cycles have the same error, so that the correlation rho at
+    a later lag is large, they count as m/(1 + (m - 1) rho) cycles.
+
+    Parameters
+    ----------
+    residual : (n,) array_like
+        Rows in the order of measurement.
+
+    Returns
+    -------
+    float
+        Number between 1 and n; n for few rows, or if neighbouring rows are not correlated.
     """
-    if not norms.size:
-        return np.zeros((0, 0)), np.zeros((0, 0))
-    scaled = jacobian / norms
-    inverse_root = np.linalg.pinv(scaled, rcond=MIN_SINGULAR_VALUE) / norms[:, None]
-    return inverse_root @ inverse_root.T, null_space(scaled, rcond=MIN_SINGULAR_VALUE).T
+    r = np.asarray(residual, float)
+    n = r.size
+    r = r - r.mean()
+    if n < MIN_CORRELATED_ROWS or not np.ptp(r) > 0:
+        return float(n)
 
+    # autocorrelation with all lags divided by n (biased estimate), which limits their sum
+    spectrum = np.fft.rfft(r, 2 * n)
+    rho = np.fft.irfft(spectrum * spectrum.conj())[:n]
+    rho /= rho[0]
+    if rho[1] <= CHANCE_CORRELATION_FACTOR / np.sqrt(n):
+        return float(n)
+    # a lag without correlation exists, because the sum over all lags is -1/2
+    first_lag = int(np.flatnonzero(rho[1:] <= 0)[0]) + 1
+    count = n / (1 + 2 * rho[1:first_lag].sum())
 
-def _list_unknown_directions(model: UnitCubeResidual, u, free, changes) -> np.ndarray:
-    """Return the directions in parameter space that the residual does not determine.
-
-    The directions (d, n) are relative changes with a maximum of 1. If a value at the point u is 0, they are changes
-    relative to the range. `u` (n,) is a point in the unit cube, `free` (f,) are the indices of its coordinates inside
-    the bounds that have an effect, and `changes` (d, f) are the undetermined changes of these.
-    """
-    values = model.space.to_values(u)
-    scale = values if values[free].all() else model.space.high - model.space.low
-    directions = np.zeros((len(changes), u.size))
-    directions[:, free] = changes * model.space.derivatives(u)[free] / scale[free]
-    for row in directions:
-        row /= row[np.argmax(np.abs(row))]
-        row[np.abs(row) < 1e-3] = 0.0
-    return directions
+    # cycles with the same error, from the unbiased estimate: there are n - lag products at each lag
+    lags = np.arange(first_lag + 1, n // 2 + 1)
+    if lags.size > 2:
+        correlation = rho[lags] / (1 - lags / n)
+        best = int(np.argmax(correlation))
+        if correlation[best] >= MIN_CYCLE_CORRELATION:
+            count /= 1 + (n / lags[best] - 1) * min(correlation[best], 1.0)
+    return float(np.clip(count, 1.0, n))

@@ -1,11 +1,8 @@
 """Least squares with bounds: fitted parameters, 95 % intervals, and undetermined directions.
 
-The parameters are mapped to the unit cube, on a logarithmic scale if the bounds are positive and wide. Local
-searches (descents) start from several points, the same in every call. If evaluations are expensive, they use
-one-sided differences, and the best of them is continued with central ones. The confidence intervals are those of the
-linearized problem, with Student's t distribution for (rows - parameters) degrees of freedom. In a time series, only the
-independent rows count (`correlation`). If the residual is not linear over an interval, or the parameter lies on a bound,
-the interval follows from the profile of the sum of squares.
+Descents start from several points, the same in every call, and end where an earlier one has ended. If evaluations are
+expensive, they use one-sided differences and secants. The confidence intervals (`intervals`) use Student's t distribution
+for (rows - parameters) degrees of freedom.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,21 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core import NotConverged, Outcome
-from .descent import Descent, descend
+from .descent import Descent, SearchCounts, UnitCubeResidual, descend, make_search_space
 from .intervals import FitIntervals, IntervalKind, compute_intervals
-from .space import (
-    SearchCounts,
-    UnitCubeResidual,
-    make_search_space,
-    make_space_filling_points,
-)
 
 # A descent has reached the best minimum if the ratio of its residual to the smallest one is at most this value.
 SAME_MINIMUM_RATIO = 1.01
-# Largest distance from a bound at which a parameter is tried on the bound, relative to its range.
-NEAR_BOUND_FRACTION = 1e-3
-# Number of trial points per parameter for the choice of the starting points.
+# Number of trial points for the choice of the starting points: per parameter, and per start of an expensive residual
 N_TRIALS_PER_VALUE = 8
+N_TRIALS_PER_START = 3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -100,7 +90,7 @@ class Problem:
     before_start : callable, optional
         Called before each starting point and each descent.
     is_expensive : bool
-        Whether all descents but the last use a looser tolerance and one-sided differences.
+        Whether descents use a looser tolerance, one-sided differences and secants.
     """
 
     def __init__(
@@ -156,19 +146,13 @@ class Problem:
         if model.rows < n:
             raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
 
-        ends = []
+        ends: list[Descent] = []
         for start in starts:
             self.before_start()
-            ends.append(descend(model, start, range(n)))
+            ends.append(descend(model, start, ends))
             report()
         best = min(ends, key=lambda end: end.cost)
         descent_rms = np.sqrt([end.cost / end.rows for end in ends])
-        if model.is_expensive:
-            # the best descent is continued with central differences
-            self.before_start()
-            model.is_expensive = False
-            best = descend(model, best.u, range(n))
-            model.is_expensive = True
         rms = np.sqrt(best.cost / best.rows)
         n_confirming = np.count_nonzero(descent_rms <= SAME_MINIMUM_RATIO * rms)
         is_done = best.is_converged or n_confirming > 1
@@ -176,7 +160,9 @@ class Problem:
             descent_rms = self.earlier_rms
         return Fit(
             values=model.space.to_values(best.u),
-            at_bound=_name_bounds(best.u),
+            at_bound=tuple(
+                np.where(best.u <= 0, "low", np.where(best.u >= 1, "high", "")).tolist()
+            ),
             intervals=None,
             rms=rms,
             counts=model.counts,
@@ -185,42 +171,21 @@ class Problem:
         )
 
     def add_intervals(self, fit: Fit, kind: str) -> Fit:
-        """Return a fit of this problem with the 95 % intervals of its values.
-
-        Parameters near a bound are tried on it first.
-
-        Parameters
-        ----------
-        fit : Fit
-            Result of `search`.
-        kind : str
-            Value of `IntervalKind`.
-        """
-        model = self.model
-        u = model.space.to_unit_cube(fit.values)
-        u, cost = _move_onto_bounds(model, u, model.sum_of_squares(u))
-        intervals = compute_intervals(model, u, cost, kind)
-        return replace(
-            fit,
-            values=model.space.to_values(u),
-            at_bound=_name_bounds(u),
-            intervals=intervals,
-            rms=np.sqrt(cost / model.rows),
-            counts=model.counts,
-        )
+        """Return a fit of this problem with the 95 % intervals of its values, under an `IntervalKind`."""
+        intervals = compute_intervals(self.model, self.model.space.to_unit_cube(fit.values), kind)
+        return replace(fit, intervals=intervals, counts=self.model.counts)
 
     def _choose_starts(self, max_points: int) -> list[np.ndarray]:
-        """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points.
-
-        If evaluations are expensive, no more points are tried than needed.
-        """
+        """Return the starting points (n,) in the unit cube: that of the problem, then the best of some trial points."""
         space = self.model.space
         n = space.low.size
         given = [] if self.start is None else [space.to_unit_cube(self.start)]
         points = [point for point in given if np.isfinite(self._try_point(point))]
         trials = []
         if max_points > len(points):
-            count = max_points if self.model.is_expensive else N_TRIALS_PER_VALUE * n
+            count = N_TRIALS_PER_VALUE * n
+            if self.model.is_expensive:
+                count = N_TRIALS_PER_START * max_points
             trials = make_space_filling_points(count, n)
             costs = np.array([self._try_point(point) for point in trials])
             order = np.argsort(costs, kind="stable")
@@ -238,25 +203,12 @@ class Problem:
         return self.model.sum_of_squares(point)
 
 
-def _name_bounds(u: np.ndarray) -> tuple[str, ...]:
-    """Return "low", "high" or "" for each coordinate `u` (n,) of the unit cube."""
-    return tuple(np.where(u <= 0, "low", np.where(u >= 1, "high", "")).tolist())
+def make_space_filling_points(count: int, n: int) -> np.ndarray:
+    """Return points (count, n) of the unit cube with low discrepancy, the same in every call.
 
-
-def _move_onto_bounds(
-    model: UnitCubeResidual, u: np.ndarray, cost: float
-) -> tuple[np.ndarray, float]:
-    """Move parameters that are near a bound onto it, and fit the others again, unless the sum of squares increases.
-
-    A parameter is moved only if the sum of squares decreases towards the bound. `u` (n,) is a point in the unit cube,
-    and `cost` its sum of squares. Returned are both after the move.
+    The points are an additive recurrence with the root of x^(n + 1) = x + 1 (Roberts 2018).
     """
-    gradient = model.jacobian(u, range(u.size)).T @ model(u)
-    belongs_on_low = (u < NEAR_BOUND_FRACTION) & (gradient > 0)
-    belongs_on_high = (u > 1 - NEAR_BOUND_FRACTION) & (gradient < 0)
-    belongs_on_bound = belongs_on_low | belongs_on_high
-    if not belongs_on_bound.any():
-        return u, cost
-    moved = np.where(belongs_on_bound, np.round(u), u)
-    end: Descent = descend(model, moved, np.flatnonzero(~belongs_on_bound))
-    return (end.u, end.cost) if end.cost <= cost * (1 + 1e-9) else (u, cost)
+    root = 2.0
+    for _ in range(60):
+        root = (1 + root) ** (1 / (n + 1))
+    return (0.5 + np.outer(np.arange(1, count + 1), root ** -np.arange(1.0, n + 1))) % 1.0

@@ -23,6 +23,7 @@ PUBLIC = {
     ),
     "grading": (
         "Layout",
+        "RowHeights",
         "divide_into_columns",
         "divide_into_rows",
         "tributary_lengths",

@@ -28,11 +28,10 @@ CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lo
 EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "lower_far": 14}
 
 
-class TaggedBlock(NamedTuple):
-    """Cells, lines or vertices (t, k) of one kind, named as in meshio, and the tag (t,) of each."""
+class TaggedCells(NamedTuple):
+    """Nodes (t, k) of cells of one kind, and the tag (t,) of each, "" for none."""
 
-    kind: str
-    cells: np.ndarray
+    nodes: np.ndarray
     names: np.ndarray
 
 
@@ -40,25 +39,25 @@ class TaggedMesh(NamedTuple):
     """Mesh with named groups of cells and edges, as read from a file.
 
     - ``points``: (N, 2) or (N, 3) [m]
-    - ``blocks``: list of TaggedBlock; lines and vertices tag edges
+    - ``cells``: TaggedCells by the name of their element in meshio
+    - ``edges``: nodes of the edges by tag, in any order
     - ``tag_help``: how files of this format contain tags, for messages
     """
 
     points: np.ndarray
-    blocks: list[TaggedBlock]
+    cells: dict[str, TaggedCells]
+    edges: dict[str, np.ndarray]
     tag_help: str
 
-    def select(self, kinds, *tags: str) -> list[TaggedBlock]:
-        """Return the cells of some kinds that have one of the tags, as one TaggedBlock per block of the file.
-
-        `kinds` is `ELEMENTS` for the plane elements, and None for lines and vertices.
-        """
-        out = []
-        for kind, cells, names in self.blocks:
-            is_here = np.isin(names, tags) & ((kind in ELEMENTS) == (kinds is ELEMENTS))
+    def select_piece(self, side: str) -> dict[str, TaggedCells]:
+        """Return the cells of the piece "lower" or "upper" by the name of their element."""
+        tags = (f"{side}_substrate", f"{side}_coating")
+        selected = {}
+        for kind, (nodes, names) in self.cells.items():
+            is_here = np.isin(names, tags)
             if is_here.any():
-                out.append(TaggedBlock(kind, cells[is_here], names[is_here]))
-        return out
+                selected[kind] = TaggedCells(nodes[is_here], names[is_here])
+        return selected
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -100,11 +99,7 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
         upper = _build_piece(mesh, "upper")
 
         # Shared nodes would bond the pieces; interfaces of different ends would not face each other
-        nodes = []
-        for side in ("lower", "upper"):
-            blocks = mesh.select(ELEMENTS, f"{side}_substrate", f"{side}_coating")
-            nodes.append(np.concatenate([block.cells.ravel() for block in blocks]))
-
+        nodes = [_list_nodes(mesh.select_piece(side)) for side in ("lower", "upper")]
         n_shared = np.intersect1d(*nodes).size
         if n_shared:
             raise PatchfemError(
@@ -128,26 +123,26 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
     )
 
 
+def _list_nodes(cells: dict[str, TaggedCells]) -> np.ndarray:
+    """Return the different nodes of cells, in ascending order."""
+    return np.unique(np.concatenate([nodes.ravel() for nodes, _ in cells.values()]))
+
+
 def _check_tags(mesh: TaggedMesh) -> None:
     """Raise PatchfemError if a tag that the mesh needs is missing or a cell has an unknown tag."""
-    missing = [tag for tag in EDGE_TAGS if not mesh.select(None, tag)]
-    missing += [
-        tag for tag in ("lower_substrate", "upper_substrate") if not mesh.select(ELEMENTS, tag)
-    ]
+    names = set()
+    for group in mesh.cells.values():
+        names |= set(np.unique(group.names).tolist())
+    missing = {*EDGE_TAGS, "lower_substrate", "upper_substrate"} - names - set(mesh.edges)
     if missing:
-        known_tags = set()
-        for block in mesh.blocks:
-            known_tags |= set(np.unique(block.names).tolist()) - {""}
+        known_tags = sorted((names | set(mesh.edges)) - {""})
         raise PatchfemError(
             f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help}; tags in the "
-            f"file: {', '.join(sorted(known_tags)[:MAX_LISTED_TAGS]) or 'none'})"
+            f"file: {', '.join(known_tags[:MAX_LISTED_TAGS]) or 'none'})"
         )
 
-    # Cells without a known tag have no material. Other elements, such as edges, may have any tag.
-    unknown = set()
-    for block in mesh.blocks:
-        if block.kind in ELEMENTS:
-            unknown |= set(np.unique(block.names).tolist()) - set(CELL_TAGS)
+    # Cells without a known tag have no material. Edges may have any tag.
+    unknown = names - set(CELL_TAGS)
     if unknown:
         tag_list = ", ".join(sorted(name or "no tag" for name in unknown)[:4])
         raise PatchfemError(
@@ -156,13 +151,13 @@ def _check_tags(mesh: TaggedMesh) -> None:
 
 
 def _check_numbers(mesh: TaggedMesh) -> None:
-    """Raise PatchfemError unless the cells of a mesh refer to existing nodes in one plane."""
+    """Raise PatchfemError unless the cells and edges of a mesh refer to existing nodes in one plane."""
     n_points = len(mesh.points)
-    nodes = np.concatenate([block.cells.ravel() for block in mesh.blocks])
-    if nodes.min() < 0 or nodes.max() >= n_points:
-        wrong_node = nodes.min() if nodes.min() < 0 else nodes.max()
+    nodes = np.concatenate([_list_nodes(mesh.cells), *mesh.edges.values()])
+    wrong_nodes = nodes[(nodes < 0) | (nodes >= n_points)]
+    if wrong_nodes.size:
         raise PatchfemError(
-            f"a cell names node {int(wrong_node)}, but the file has {n_points} nodes"
+            f"a cell names node {wrong_nodes[0]}, but the file has {n_points} nodes"
         )
     used_points = mesh.points[nodes]
     # Squares of larger coordinates overflow.
@@ -182,17 +177,15 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
     Only the nodes of its cells are kept, and they are numbered anew. Depths are >= 0 from the interface into the
     piece.
     """
-    tagged = mesh.select(ELEMENTS, f"{side}_substrate", f"{side}_coating")
-    used = np.unique(np.concatenate([block.cells.ravel() for block in tagged]))
+    selected = mesh.select_piece(side)
+    used = _list_nodes(selected)
     # Coordinates along the interface and depths below it, which are >= 0 in both pieces.
     points = mesh.points[used, :2] * [1.0, -1.0 if side == "lower" else 1.0]
     blocks = {}
     is_coating = []
-    for kind in dict.fromkeys(block.kind for block in tagged):
-        parts = [block for block in tagged if block.kind == kind]
-        cells = np.searchsorted(used, np.concatenate([block.cells for block in parts]))
-        blocks[kind] = _turn_counterclockwise(points, cells, kind)
-        is_coating += [block.names == f"{side}_coating" for block in parts]
+    for kind, (nodes, names) in selected.items():
+        blocks[kind] = _turn_counterclockwise(points, np.searchsorted(used, nodes), kind)
+        is_coating.append(names == f"{side}_coating")
     if len({ELEMENTS[kind].is_quadratic for kind in blocks}) > 1:
         raise PatchfemError(
             f"the {side} piece has elements of first and of second order, which do not fit together"
@@ -203,9 +196,7 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
     _check_middles(points, edges, side)
     ends = []
     for name in (f"{side}_interface", f"{side}_far"):
-        nodes = np.unique(
-            np.concatenate([block.cells.ravel() for block in mesh.select(None, name)])
-        )
+        nodes = np.unique(mesh.edges[name])
         n_strange = int((~np.isin(nodes, used)).sum())
         if n_strange:
             raise PatchfemError(

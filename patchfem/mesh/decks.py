@@ -9,7 +9,7 @@ import re
 import numpy as np
 
 from ..core import PatchfemError
-from .checks import CELL_TAGS, EDGE_TAGS, TaggedBlock, TaggedMesh
+from .checks import CELL_TAGS, EDGE_TAGS, TaggedCells, TaggedMesh
 from .elements import ELEMENTS
 
 # How a deck contains tags, for messages
@@ -68,37 +68,22 @@ class Deck:
             )
         # Lines are words: node number and coordinates, or element number and nodes
         if keyword == "NODE":
+            kind = "NSET"
             new = [(int(line[0]), [float(word) for word in line[1:]]) for line in lines]
-            self._add_numbered(self.nodes, new, "NSET", parameters)
+            members = _add_numbered(self.nodes, new, "node")
         elif keyword == "ELEMENT":
+            kind = "ELSET"
             new = _read_elements(parameters.get("TYPE", "").upper(), lines)
-            self._add_numbered(self.elements, new, "ELSET", parameters)
-        elif keyword in self.sets and keyword in parameters:
+            members = _add_numbered(self.elements, new, "element")
+        elif keyword in self.sets:
+            kind = keyword
             members = self._read_members(keyword, "GENERATE" in parameters, lines)
-            self.sets[keyword].setdefault(parameters[keyword].lower(), []).extend(members)
-        elif keyword == "SURFACE":
-            self.surfaces.setdefault(parameters.get("NAME", "").lower(), []).extend(lines)
-
-    def _add_numbered(
-        self,
-        contents: dict[int, object],
-        numbered_entries: list[tuple[int, object]],
-        kind: str,
-        parameters: dict[str, str],
-    ) -> None:
-        """Add nodes or elements, a list of number and content, to the `contents` by number.
-
-        PatchfemError is raised for a number given twice. If the `parameters` of the block name a set of this `kind`
-        ("NSET" or "ELSET"), the numbers of the `numbered_entries` become members of it.
-        """
-        for number, content in numbered_entries:
-            if number in contents:
-                name = "node" if kind == "NSET" else "element"
-                raise PatchfemError(f"{name} {number} is given twice")
-            contents[number] = content
+        else:
+            if keyword == "SURFACE":
+                self.surfaces.setdefault(parameters.get("NAME", "").lower(), []).extend(lines)
+            return
         if kind in parameters:
-            members = self.sets[kind].setdefault(parameters[kind].lower(), [])
-            members += [number for number, _ in numbered_entries]
+            self.sets[kind].setdefault(parameters[kind].lower(), []).extend(members)
 
     def _read_members(self, kind: str, is_range: bool, lines: list[list[str]]) -> list[int]:
         """Return the numbers of the nodes or elements in a set, which may contain other sets.
@@ -138,45 +123,60 @@ class Deck:
                 if tags.setdefault(number, tag) != tag:
                     raise PatchfemError(f"element {number} is tagged {tags[number]} and {tag}")
 
-        # Members by element in meshio: cells, nodes that tag an edge, and sides of cells
-        groups = {}
-        for number, (kind, nodes) in self.elements.items():
-            groups.setdefault(kind, []).append((nodes, tags.get(number, "")))
+        # Line elements, sets of nodes and sides of cells tag edges, by their nodes
+        cells = {}
+        edges = {}
         for tag in EDGE_TAGS:
-            for node in self.sets["NSET"].get(tag, ()):
-                groups.setdefault("vertex", []).append(([node], tag))
-            for side in self._list_sides(tag):
-                groups.setdefault("line", []).append((side, tag))
+            nodes = [*self.sets["NSET"].get(tag, ()), *self._list_side_nodes(tag)]
+            if nodes:
+                edges[tag] = nodes
+        for number, (kind, nodes) in self.elements.items():
+            tag = tags.get(number, "")
+            if kind in ELEMENTS:
+                cells.setdefault(kind, []).append((nodes, tag))
+            else:
+                edges.setdefault(tag, []).extend(nodes)
 
         # Node numbers become positions in the array of points
         position = {number: k for k, number in enumerate(self.nodes)}
-        blocks = []
-        for kind, members in groups.items():
-            for nodes, tag in members:
-                for node in nodes:
-                    if node not in position:
-                        owner = tag or "an element"
-                        raise PatchfemError(
-                            f"{owner} names node {node}, which the file does not define"
-                        )
-            cells = [[position[node] for node in nodes] for nodes, _ in members]
-            names = [tag for _, tag in members]
-            blocks.append(TaggedBlock(kind, np.array(cells, np.int64), np.array(names, str)))
+        try:
+            for kind, members in cells.items():
+                nodes, names = zip(*members)
+                rows = [[position[node] for node in cell] for cell in nodes]
+                cells[kind] = TaggedCells(np.array(rows, np.int64), np.array(names, str))
+            for tag, nodes in edges.items():
+                edges[tag] = np.array([position[node] for node in nodes])
+        except KeyError as error:
+            raise PatchfemError(
+                f"an element or a set names node {error}, which the file does not define"
+            ) from None
 
         if len({len(coordinates) for coordinates in self.nodes.values()}) > 1:
             raise PatchfemError("either all nodes need two coordinates, or all nodes need three")
         points = np.array(list(self.nodes.values()), float).reshape(len(self.nodes), -1)
-        return TaggedMesh(points, blocks, DECK_TAG_HELP)
+        return TaggedMesh(points, cells, edges, DECK_TAG_HELP)
 
-    def _list_sides(self, tag: str) -> list[list[int]]:
+    def _list_side_nodes(self, tag: str) -> list[int]:
         """Return both corner nodes of each element side in the surface with the name `tag`."""
-        sides = []
+        corners = []
         for member, side_name, *_ in self.surfaces.get(tag, ()):
             side = int(side_name.upper().removeprefix("S"))
             for element in self._find_members("ELSET", member):
                 kind, nodes = self.elements[element]
-                sides.append([nodes[side - 1], nodes[side % ELEMENTS[kind].n_corners]])
-        return sides
+                corners += [nodes[side - 1], nodes[side % ELEMENTS[kind].n_corners]]
+        return corners
+
+
+def _add_numbered(contents: dict[int, object], entries: list, name: str) -> list[int]:
+    """Add nodes or elements, pairs of a number and a content, to the contents by number, and return the numbers.
+
+    PatchfemError is raised for a number given twice; `name` says of what.
+    """
+    for number, content in entries:
+        if number in contents:
+            raise PatchfemError(f"{name} {number} is given twice")
+        contents[number] = content
+    return [number for number, _ in entries]
 
 
 def read_deck(text: str) -> TaggedMesh:

@@ -4,6 +4,7 @@ The shape functions of an element are the combinations of its monomials that are
 are ordered as in meshio: corners, middles of the edges from corner to corner, centre.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -109,3 +110,16 @@ ELEMENTS = {
         _SQUARE_CORNERS, [*_SERENDIPITY_EXPONENTS, (2, 2)], _square_rule(3), has_centre=True
     ),
 }
+
+
+def number_cells(
+    blocks: dict[str, np.ndarray],
+) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+    """Yield the element, the nodes (t, k) and the numbers (t,) of the cells of each element of a mesh.
+
+    `blocks` are the nodes by the name of their element, by whose order the cells are numbered.
+    """
+    n_cells = 0
+    for kind, nodes in blocks.items():
+        yield kind, nodes, np.arange(n_cells, n_cells + len(nodes))
+        n_cells += len(nodes)

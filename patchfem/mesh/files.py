@@ -14,9 +14,9 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..disk.atomic_write import write_atomically
-from .checks import CELL_TAGS, EDGE_TAGS, PairMesh, TaggedBlock, TaggedMesh, build_pair
+from .checks import CELL_TAGS, EDGE_TAGS, PairMesh, TaggedCells, TaggedMesh, build_pair
 from .decks import read_deck
-from .elements import ELEMENTS
+from .elements import ELEMENTS, number_cells
 from .pieces import find_edges
 
 # Largest size of a mesh file [bytes]; meshes of two plane pieces are smaller
@@ -51,10 +51,10 @@ def write_mesh(lower, path: Path, upper=None) -> None:
 
     points, blocks = join_meshes(lower, lower if upper is None else upper)
     numbers = CELL_TAGS | EDGE_TAGS
-    tags = [np.array([numbers[name] for name in block.names], np.int32) for block in blocks]
+    tags = [np.array([numbers[name] for name in names], np.int32) for _, names in blocks.values()]
     mesh = meshio.Mesh(
         np.column_stack([points, np.zeros(len(points))]),
-        [(block.kind, block.cells) for block in blocks],
+        [(kind, nodes) for kind, (nodes, _) in blocks.items()],
     )
 
     # Gmsh names its physical groups by dimension and number; a .vtu file has the numbers alone
@@ -71,7 +71,7 @@ def write_mesh(lower, path: Path, upper=None) -> None:
         meshio.write(partial, mesh, **options)
 
 
-def join_meshes(lower_piece, upper_piece) -> tuple[np.ndarray, list[TaggedBlock]]:
+def join_meshes(lower_piece, upper_piece) -> tuple[np.ndarray, dict[str, TaggedCells]]:
     """Join the meshes `lower_piece` and `upper_piece` of a pair, the lower piece at y <= 0 and first.
 
     Both are `PieceMesh`, whose second coordinate is the depth below the interface.
@@ -79,8 +79,8 @@ def join_meshes(lower_piece, upper_piece) -> tuple[np.ndarray, list[TaggedBlock]
     Returns
     -------
     points : (N, 2) ndarray [m]
-    blocks : list of TaggedBlock
-        Cells by element, then the edges of the interfaces and of the far faces.
+    blocks : dict of str to TaggedCells
+        Cells by element in meshio, then the edges of the interfaces and of the far faces.
     """
     points = []
     cells = {}
@@ -88,11 +88,8 @@ def join_meshes(lower_piece, upper_piece) -> tuple[np.ndarray, list[TaggedBlock]
     n_points = 0
     for side, sign, body in (("lower", -1.0, lower_piece), ("upper", 1.0, upper_piece)):
         # Cells of a kind, with the numbers of their nodes among those of both pieces
-        n_cells = 0
-        for kind, nodes in body.blocks.items():
-            is_coating = body.is_coating[n_cells : n_cells + len(nodes)]
-            n_cells += len(nodes)
-            names = np.where(is_coating, f"{side}_coating", f"{side}_substrate")
+        for kind, nodes, numbers in number_cells(body.blocks):
+            names = np.where(body.is_coating[numbers], f"{side}_coating", f"{side}_substrate")
             cells.setdefault(kind, []).append((nodes + n_points, names))
 
         # Lines along the tagged edges of the border; those of second order have the node in their middle as well
@@ -109,8 +106,15 @@ def join_meshes(lower_piece, upper_piece) -> tuple[np.ndarray, list[TaggedBlock]
 
     n_line_nodes = lines[0][0].shape[1]
     cells[LINE_NAMES[n_line_nodes - 2]] = lines
-    blocks = [TaggedBlock(kind, *map(np.concatenate, zip(*parts))) for kind, parts in cells.items()]
-    return np.concatenate(points), blocks
+    return np.concatenate(points), _join_cells(cells)
+
+
+def _join_cells(parts_by_kind: dict[str, list]) -> dict[str, TaggedCells]:
+    """Join parts of cells, each nodes (t, k) and names (t,), by the name of their element."""
+    joined = {}
+    for kind, parts in parts_by_kind.items():
+        joined[kind] = TaggedCells(*map(np.concatenate, zip(*parts)))
+    return joined
 
 
 def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
@@ -205,7 +209,8 @@ def _convert_mesh(path: Path, mesh) -> TaggedMesh:
     Raises PatchfemError, which names the file `path`, for cells that cannot be used.
     """
     tags = _read_tags(path, mesh)
-    blocks = []
+    cells = {}
+    edges = {}
     for block, codes in zip(mesh.cells, tags.codes or [None] * len(mesh.cells)):
         if block.type == "vertex":
             continue
@@ -213,15 +218,20 @@ def _convert_mesh(path: Path, mesh) -> TaggedMesh:
             raise PatchfemError(
                 f"{path}: {block.type} cells; only plane triangles, quadrilaterals and lines can be used"
             )
-        dimension = 1 if block.type in LINE_NAMES else 2
+        is_line = block.type in LINE_NAMES
         codes = np.zeros(len(block.data), int) if codes is None else np.ravel(codes)
         names = [
-            tags.names.get((dimension, code), f"tag {code}" if code else "")
+            tags.names.get((1 if is_line else 2, code), f"tag {code}" if code else "")
             for code in map(int, codes)
         ]
-        cells = np.asarray(block.data, np.int64)
-        blocks.append(TaggedBlock(block.type, cells, np.array(names, str)))
-    return TaggedMesh(np.asarray(mesh.points, float), blocks, tags.tag_help)
+        nodes = np.asarray(block.data, np.int64)
+        if not is_line:
+            cells.setdefault(block.type, []).append((nodes, np.array(names, str)))
+            continue
+        for name, line in zip(names, nodes):
+            edges.setdefault(name, []).append(line)
+    edges = {name: np.concatenate(lines) for name, lines in edges.items()}
+    return TaggedMesh(np.asarray(mesh.points, float), _join_cells(cells), edges, tags.tag_help)
 
 
 def _read_with_meshio(path: Path):

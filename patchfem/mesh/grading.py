@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,23 +18,20 @@ class Layout:
 
     - ``bands``: (from, to, length) [m] each. A cell has this length within the band and grows by
       `slope` per distance from it.
-    - ``span``: (from, to) [m] that is loaded
-    - ``max_loaded_length``, ``max_length``: maximum cell lengths [m] within the span and far from it
+    - ``max_length``: maximum cell length [m], far from all bands
     """
 
     start: float
     stop: float
     bands: tuple[tuple[float, float, float], ...]
-    span: tuple[float, float]
-    max_loaded_length: float
     max_length: float
     slope: float
 
     def cell_lengths(self, x) -> np.ndarray:
         """Return the target cell lengths (k,) [m] at positions x (k,) [m].
 
-        Each is the smallest of the lengths that the bands, the loaded span and the limit allow there. Outside a band
-        or span its length grows with the distance, by `slope` per unit.
+        Each is the smallest of the lengths that the bands and the limit allow there. Outside a band its length grows
+        with the distance, by `slope` per unit.
         """
         x = np.asarray(x, float)
         out = np.full(x.shape, self.max_length)
@@ -43,16 +41,13 @@ class Layout:
             lengths *= self.slope
             lengths += length
             np.minimum(out, lengths, out=out)
-        return np.minimum(
-            out, self.max_loaded_length + self.slope * _distance_from_interval(x, *self.span)
-        )
+        return out
 
     def scale_cells(self, factor: float) -> "Layout":
         """Return the layout after all cell lengths, and their slope, are multiplied by a factor."""
         return replace(
             self,
             bands=tuple((low, high, length * factor) for low, high, length in self.bands),
-            max_loaded_length=self.max_loaded_length * factor,
             max_length=self.max_length * factor,
             slope=self.slope * factor,
         )
@@ -143,15 +138,35 @@ def divide_into_columns(layout: Layout, required_positions=()) -> np.ndarray:
     return frozen_array(np.concatenate(parts))
 
 
-def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarray, int]:
+class RowHeights(NamedTuple):
+    """Heights [m] of the rows of cells of a piece at some depths, between which they grow.
+
+    - first, last: At the interface and at the far face.
+    - coating: At the inner face of the coating.
+    - largest: Largest height.
+    - growth: Growth of the height with the distance from these places [1].
+    """
+
+    first: float
+    last: float
+    coating: float
+    largest: float
+    growth: float
+
+
+def divide_into_rows(
+    height: float, coating_thickness: float, rows: RowHeights
+) -> tuple[np.ndarray, int]:
     """Return the depths that bound the rows of cells, at least two in the coating and three below it.
 
     Parameters
     ----------
-    layout : Layout
-        Interval from the interface to the far face, and target heights.
+    height : float
+        Depth of the far face [m].
     coating_thickness : float
-        Thickness of the coating [m], at whose depth a row ends.
+        Thickness of the coating [m], at whose depth a row ends; 0 without a coating.
+    rows : RowHeights
+        Target heights.
 
     Returns
     -------
@@ -160,12 +175,12 @@ def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarr
     coating_rows : int
         Number of rows in the coating.
     """
-    substrate_lines = divide_interval(
-        replace(layout, start=layout.start + coating_thickness), min_cells=3
-    )
-    if coating_thickness <= 0:
-        return frozen_array(substrate_lines), 0
-    coating_lines = divide_interval(
-        replace(layout, stop=layout.start + coating_thickness), min_cells=2
-    )[:-1]
-    return frozen_array(np.concatenate([coating_lines, substrate_lines])), coating_lines.size
+    bands = ((0.0, 0.0, rows.first), (height, height, rows.last))
+    if coating_thickness:
+        bands += ((coating_thickness, coating_thickness, rows.coating),)
+    layout = Layout(0.0, height, bands, rows.largest, rows.growth)
+    depths = divide_interval(replace(layout, start=coating_thickness), min_cells=3)
+    if not coating_thickness:
+        return frozen_array(depths), 0
+    coating_depths = divide_interval(replace(layout, stop=coating_thickness), min_cells=2)[:-1]
+    return frozen_array(np.concatenate([coating_depths, depths])), coating_depths.size

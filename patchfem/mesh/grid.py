@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core import frozen_array
 from .ends import SHARP_END, End
-from .grading import Layout, divide_into_rows, tributary_lengths
+from .grading import Layout, RowHeights, divide_interval, divide_into_rows, tributary_lengths
 
 COLUMN_LENGTH_RATIO = 1.1  # ratio of the lengths of successive columns beyond the interface, unless another one is given
 # Number of equal columns beyond which the rows become shorter with the columns; with fewer columns
@@ -201,55 +201,19 @@ class TensorGrid:
         -------
         TensorGrid
         """
-        half_interface = float(self.x[-1])
         cell = float(self.x[-1] - self.x[-2])
-        outer = [np.zeros(1)]
-        for stop in sorted({length / 2 - end.size, length / 2}):
-            if stop > half_interface * (1 + 1e-12):
-                columns = compute_row_heights(cell, stop - half_interface - outer[-1][-1], growth)
-                outer.append(outer[-1][-1] + np.cumsum(columns))
-                cell = columns[-1] * growth
-        return replace(self, outer=frozen_array(np.concatenate(outer)), end=end)
-
-
-def compute_row_heights(
-    first_height: float, total_height: float, growth: float = COLUMN_LENGTH_RATIO, min_rows: int = 1
-) -> np.ndarray:
-    """Compute heights of rows that grow with a constant ratio and add up to a total.
-
-    Parameters
-    ----------
-    first_height : float
-        Height of the first row [m], or a little less.
-    total_height : float
-        Sum of the heights [m].
-    growth : float
-        Largest ratio of successive heights, above 1.
-    min_rows : int
-        Minimum number of rows.
-
-    Returns
-    -------
-    (ny,) ndarray
-        Heights [m], the smallest first.
-    """
-    first_height = min(first_height, total_height / min_rows)
-    n_rows = max(
-        min_rows, ceil(log(1 + total_height * (growth - 1) / first_height) / log(growth) - 1e-9)
-    )
-    if n_rows * first_height >= total_height * (1 - 1e-12):
-        return np.full(n_rows, total_height / n_rows)
-    # The sum is convex in the ratio, so Newton steps from above decrease until round-off.
-    powers = np.arange(n_rows)
-    next_ratio = growth * (1 + 1e-6) + 1e-6
-    ratio = np.inf
-    while next_ratio < ratio:
-        ratio = next_ratio
-        rows = ratio**powers
-        derivative = first_height * (powers[1:] @ rows[:-1])
-        next_ratio = ratio - (first_height * rows.sum() - total_height) / derivative
-    rows = first_height * ratio**powers
-    return rows * (total_height / rows.sum())
+        slope = log(growth)
+        outer = np.zeros(1)
+        for half_length in sorted({length / 2 - end.size, length / 2}):
+            start = outer[-1]
+            stop = half_length - float(self.x[-1])
+            if stop > start + 1e-12 * self.x[-1]:
+                # Between lines at equal steps of the integral of 1/length, the first column has the length `cell`
+                bands = ((start, start, cell * slope / (growth - 1)),)
+                layout = Layout(start, stop, bands, np.inf, slope)
+                outer = np.append(outer, divide_interval(layout)[1:])
+                cell = (outer[-1] - outer[-2]) * growth
+        return replace(self, outer=frozen_array(outer), end=end)
 
 
 def make_graded_grid(
@@ -279,17 +243,15 @@ def make_graded_grid(
     reference_cell = length / n_columns / scale
 
     # The stress is singular at the ends of the far face, so that the rows are short there as well.
-    bands = [(0.0, 0.0, reference_cell), (height, height, reference_cell)]
-    if coating_thickness:
-        coating_row = min(reference_cell, coating_thickness / N_COATING_ROWS)
-        bands += [(coating_thickness, coating_thickness, coating_row)]
-    max_row = height / MIN_PIECE_ROWS
-    rows = Layout(
-        0.0, height, tuple(bands), (0.0, height), max_row, max_row, ROW_HEIGHT_GROWTH
-    ).scale_cells(scale)
-
+    rows = RowHeights(
+        first=scale * reference_cell,
+        last=scale * reference_cell,
+        coating=scale * min(reference_cell, coating_thickness / N_COATING_ROWS),
+        largest=scale * height / MIN_PIECE_ROWS,
+        growth=scale * ROW_HEIGHT_GROWTH,
+    )
     x = np.linspace(-length / 2, length / 2, n_columns + 1)
-    return TensorGrid(frozen_array(x), *divide_into_rows(rows, coating_thickness))
+    return TensorGrid(frozen_array(x), *divide_into_rows(height, coating_thickness, rows))
 
 
 def compute_row_scale(n_columns: int) -> float:

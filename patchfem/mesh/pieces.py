@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import frozen_array
-from .elements import ELEMENTS
+from .elements import ELEMENTS, number_cells
 from .grading import tributary_lengths
 from .grid import TensorGrid
 
@@ -186,15 +186,13 @@ def find_edges(blocks: dict[str, np.ndarray], n_points: int) -> CellEdges:
     ends = []
     owners = []
     middles = []
-    n_cells = 0
-    for kind, cells in blocks.items():
+    for kind, cells, numbers in number_cells(blocks):
         n = ELEMENTS[kind].n_corners
         corners = cells[:, :n]
         ends.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
-        owners.append(np.repeat(np.arange(n_cells, n_cells + len(cells)), n))
+        owners.append(np.repeat(numbers, n))
         has_middles = cells.shape[1] >= 2 * n
         middles.append(cells[:, n : 2 * n].ravel() if has_middles else np.full(corners.size, -1))
-        n_cells += len(cells)
 
     # Both cells at an edge have the same key, whatever the direction in which they pass it
     ends = np.concatenate(ends)

@@ -8,15 +8,13 @@ from time import process_time
 
 import numpy as np
 
-from .. import contact
 from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
 from ..surface.areal import Areal, fill_nearest, find_scan_spikes, level
 from ..surface.files.read import read_surface
-from .file_cache import cache_by_file
 from .gap import ShapedGap
 from .patch import PatchModel
-from .source import name_key
+from .source import cache_by_file, name_key
 
 SCAN_KEY = "contact.profile.scan"
 # Smallest share of the face that a scan covers; a smaller one says little about the other heights.
@@ -45,27 +43,18 @@ def compute_face_gap(patch: PatchModel, x: np.ndarray, y: np.ndarray) -> ShapedG
     PatchfemError
         If the scan cannot be read or does not cover half of the face.
     """
-    heights = np.zeros((y.size, x.size))
-    notes = ()
-    seconds = {}
-    for name, shape_keys in patch.gap.shapes:
-        begin = process_time()
-        keys = {key: value for key, value in shape_keys if key != "on"}
-        heights = heights + getattr(contact.gaps, name)(x[None, :], **keys, y=y[:, None])
-        seconds[name] = process_time() - begin
+    shaped = patch.gap.add_up_shapes(x[None, :], y=y[:, None])
+    scan = patch.area.scan
+    if scan is None:
+        return shaped
 
     # A scan that is larger than the face is cropped, and a smaller one goes on with its last heights.
-    scan = patch.area.scan
-    if scan is not None:
-        begin = process_time()
-        with name_key(SCAN_KEY):
-            part = read_face(scan.path, scan.at, patch.pieces.length, patch.pieces.width)
-        sign = -1.0 if scan.is_material else 1.0
-        measured = sign * average_over_cells(part, x, y)
-        heights = heights + measured - measured.min()
-        notes = part.notes
-        seconds["profile"] = process_time() - begin
-    return ShapedGap(heights, notes, seconds)
+    begin = process_time()
+    with name_key(SCAN_KEY):
+        part = read_face(scan.path, scan.at, patch.pieces.length, patch.pieces.width)
+    sign = -1.0 if scan.is_material else 1.0
+    measured = sign * average_over_cells(part, x, y)
+    return shaped.add_profile(measured - measured.min(), part.notes, process_time() - begin)
 
 
 def read_scan(path) -> Areal:

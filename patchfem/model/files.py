@@ -5,29 +5,27 @@ computed. The module that reads a kind of file is imported only if a scene names
 the imports are half of the time of a check.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from .. import inputs
 from ..effects import find_waveform
 from ..exceptions import PatchfemError
-from ..inputs import measured
 from ..mesh import files
 from ..scene.files import file_exists, list_named_files
 from ..scene.keys.tables import Tables
 from ..scene.rules.structure import MATRIX_KEYS
 from . import (
-    drive,
-    earlier_wear,
     face,
     gap,
     patch,
     peaks,
     pieces,
     profile,
+    rig,
     slide,
     structure_files,
-    structure_reduced,
+    wear,
 )
 
 
@@ -65,14 +63,20 @@ def find_file_faults(
         if not file_exists(path):
             continue
         checked = _select_interface(key, tables)
+        # The kind of a drive tells how its file is read.
+        compare = FILE_CHECKS.get(checked.key) if is_valid or key == "drive.file" else None
+        sentences = None
         try:
-            sentences = FILE_CHECKS[checked.key](path, checked.tables, is_valid=is_valid) or ()
+            if compare is not None:
+                sentences = compare(path, checked.tables)
+            else:
+                FILE_READERS[checked.key](path)
         except PatchfemError as error:
             fault_key = checked.prefix + (error.key or checked.key)
             faults.append(Fault(fault_key, str(error).removeprefix(f"{checked.key}: ")))
             continue
         if notes is not None:
-            notes += [sentence.replace(str(path), path.name) for sentence in sentences]
+            notes += [sentence.replace(str(path), path.name) for sentence in sentences or ()]
     if faults or not is_valid:
         return faults
     return _check_reduction(tables, folder)
@@ -111,36 +115,29 @@ def _check_reduction(tables, folder: Path) -> list[Fault]:
     if not table or not all(file_exists(folder / file) for file in matrices):
         return []
     try:
-        structure_reduced.check_reduction(folder, table, is_base_driven=tables.drive.kind == "base")
+        structure_files.check_reduction(folder, table, is_base_driven=tables.drive.kind == "base")
     except PatchfemError as error:
         return [Fault(error.key, str(error))]
     return []
 
 
-def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
-    """Check a mesh file by reading it, and compare its sizes with those of the scene.
-
-    `path` is the mesh file, and `tables` are those of the scene. They are compared only if `is_valid`, without mistakes.
-    """
-    if not is_valid:
-        files.read_pieces(path)
-        return
+def _check_mesh(path: Path, tables) -> None:
+    """Read a mesh file, and compare its sizes with those of the scene."""
     _, unit = patch.find_mesh_file(tables.contact, Path)
     pair = files.read_pieces(path, unit)
     pieces.check_mesh_size(patch.build_pieces(tables.contact), pair.lower, pair.upper, unit)
 
 
-def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
+def _check_profile(path: Path, tables) -> tuple[str, ...]:
     """Check that the trace in the file `path` covers the interface, and return notes about it.
 
-    `tables` are those of the scene. Unless they are valid (`is_valid`), or if the scene has a mesh file, the trace is
-    only read.
+    `tables` are those of the scene. If the scene has a mesh file, the trace is only read.
     """
     import numpy as np
 
     profile.read_trace(path)
     contact = tables.contact
-    if not is_valid or contact.mesh is not None:
+    if contact.mesh is not None:
         return ()
     patch_pieces = patch.build_pieces(contact)
     even_cell = patch_pieces.length / gap.N_DEFAULT_CELLS
@@ -157,101 +154,62 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
     return notes
 
 
-def _check_scan(path: Path, tables, *, is_valid: bool) -> tuple[str, ...]:
-    """Check the areal scan in the file `path`, and return notes about it.
-
-    If the `tables` of the scene are valid (`is_valid`), it must also cover half of the face.
-    """
-    if not is_valid:
-        face.read_scan(path)
-        return ()
+def _check_scan(path: Path, tables) -> tuple[str, ...]:
+    """Check that the areal scan in the file `path` covers half of the face of the scene, and return notes about it."""
     contact = tables.contact
     return face.read_face(path, contact.profile.at, contact.length, contact.width).notes
 
 
-def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
-    """Check the file `path` of a recorded drive signal, or of its spectrum, by reading it.
-
-    A signal is read only if its kind of drive is known: `is_valid`, or a kind in the `tables` of the scene.
-    """
+def _check_drive(path: Path, tables) -> None:
+    """Read a recorded drive signal, or its spectrum."""
     if find_waveform(tables.drive).is_random:
-        drive.signals.read_spectrum(path)
-    elif is_valid or tables.drive.kind is not None:
-        drive.read_drive_file(path, tables.drive.kind)
+        inputs.signals.read_spectrum(path)
+    elif tables.drive.kind is not None:
+        rig.read_drive_file(path, tables.drive.kind)
 
 
-def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
-    """Check structure.file: compute modes from matrices, but only read a universal file.
-
-    `path` is the file, and `tables` are those of the scene. Unless they are valid (`is_valid`), matrices are only read,
-    too.
-    """
-    if structure_files.is_universal(path) or not is_valid:
+def _check_structure(path: Path, tables) -> None:
+    """Compute modes from the matrices in the file `path`, but only read a universal file."""
+    if structure_files.is_universal(path):
         structure_files.read_content(path)
         return
     rubs = tables.friction is not None or bool(tables.structure.interface)
     structure_files.read_modes(path, tables.structure, tables.drive, needs_interface=rubs)
 
 
-def _check_by_reading(read: Callable[[Path], object]) -> Callable[..., None]:
-    """Return the function that checks a file by reading it, whatever the other tables of the scene contain.
-
-    `read` is a function of the path.
-    """
-
-    def check_file(path: Path, tables, *, is_valid: bool) -> None:
-        """Read the file.
-
-        Parameters
-        ----------
-        path : Path
-            File to check.
-        tables, is_valid
-            Tables of the scene, and whether they are free of mistakes. Both have no effect.
-        """
-        read(path)
-
-    return check_file
+def _check_wear_start(path: Path, tables) -> tuple[str]:
+    """Check that the result.nc file `path` of an earlier run has the pieces of the scene, and return a note on its depth."""
+    return (wear.read_earlier_wear(path, tables).sentence,)
 
 
-def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple[str]:
-    """Check the result.nc file `path` of an earlier run, and return a note about its worn depth.
-
-    If the `tables` of this scene are valid (`is_valid`), the pieces must be those of the earlier run.
-    """
-    if is_valid:
-        return (earlier_wear.read_earlier_wear(path, tables).sentence,)
-    return (earlier_wear.read_end_state(path).sentence,)
+def _check_asperities(path: Path, tables) -> None:
+    """Check that a rough surface can have the asperity peaks of the trace in the file `path`, below the cut-off."""
+    length = patch.build_pieces(tables.contact).length
+    peaks.read_spectral_moments(path, patch.find_shortest_wavelength(tables.contact, length))
 
 
-def _check_asperities(path: Path, tables, *, is_valid: bool) -> None:
-    """Check that a rough surface can have the asperity peaks found from the trace in the file `path`.
-
-    If the `tables` of the scene are valid (`is_valid`), only waves shorter than the cut-off of the scene count.
-    """
-    cutoff = None
-    if is_valid:
-        cutoff = patch.find_shortest_wavelength(
-            tables.contact, patch.build_pieces(tables.contact).length
-        )
-    peaks.read_spectral_moments(path, cutoff)
-
-
-# Function that checks a file, by the key that names it
+# Function that reads a file without using the other keys of the scene, by the key that names it. Modules are loaded on use.
+FILE_READERS = {
+    "contact.mesh": lambda path: files.read_pieces(path),
+    "contact.asperities.from": lambda path: peaks.read_spectral_moments(path),
+    "contact.profile.file": lambda path: profile.read_trace(path),
+    "contact.profile.scan": lambda path: face.read_scan(path),
+    "slide.file": lambda path: slide.read_path_file(path),
+    "structure.file": lambda path: structure_files.read_content(path),
+    **{
+        f"structure.reduced.{name}": lambda path, name=name: structure_files.read_matrix(path, name)
+        for name in MATRIX_KEYS
+    },
+    "measured.file": lambda path: inputs.measured.read_table(path),
+    "wear.start": lambda path: wear.read_end_state(path),
+}
+# Function that also compares a file with the tables of the scene, and returns notes
 FILE_CHECKS = {
     "contact.mesh": _check_mesh,
     "contact.asperities.from": _check_asperities,
     "contact.profile.file": _check_profile,
     "contact.profile.scan": _check_scan,
-    "slide.file": _check_by_reading(lambda path: slide.read_path_file(path)),
     "drive.file": _check_drive,
     "structure.file": _check_structure,
-    **{
-        f"structure.reduced.{name}": _check_by_reading(
-            lambda path, name=name: structure_reduced.read_matrix(path, name)
-        )
-        for name in MATRIX_KEYS
-    },
-    "measured.file": _check_by_reading(measured.read_table),
     "wear.start": _check_wear_start,
 }

@@ -4,7 +4,6 @@ A shape is a table of [contact] and the function of the same name in `contact.ga
 the coordinate x and the keys of the table; `effects.GAP_SHAPES` lists them.
 """
 
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from time import process_time
@@ -13,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import contact
+from ..core import array_dataclass
 from ..effects import GAP_SHAPES
 from ..scene.keys.contact import Contact
 from ..scene.keys.types import Table
@@ -49,8 +49,22 @@ class ShapedGap(NamedTuple):
     notes: tuple[str, ...]
     seconds: dict[str, float]
 
+    def add_profile(self, heights, notes: tuple[str, ...], seconds: float) -> "ShapedGap":
+        """Return the gap with the heights of a profile.
 
-@dataclass(frozen=True, eq=False, slots=True)
+        Parameters
+        ----------
+        heights : array
+            Heights [m] at the nodes.
+        notes : tuple of str
+            Sentences on the profile.
+        seconds : float
+            Its computing time [s].
+        """
+        return ShapedGap(self.heights + heights, notes, self.seconds | {"profile": seconds})
+
+
+@array_dataclass
 class Gap:
     """Shapes that together form the gap between the pieces.
 
@@ -150,31 +164,30 @@ class Gap:
         ShapedGap
             Gap [m], notes on the profile and computing time [s] of each shape.
         """
-        gap = np.zeros(x.shape)
-        notes = ()
-        seconds = {}
+        shaped = self.add_up_shapes(x)
+        if self.profile is None:
+            return shaped
+        begin = process_time()
+        heights, notes = profiles.compute_profile_gap(
+            self.profile,
+            x,
+            ProfileLengths(self.average, self.limit),
+            float(x[-1] - x[0]) / N_DEFAULT_CELLS,
+            is_rough=self.is_rough,
+            is_material=self.material,
+        )
+        return shaped.add_profile(heights, notes, process_time() - begin)
 
-        # Shapes in closed form, each with its computing time.
+    def add_up_shapes(self, x, **y) -> ShapedGap:
+        """Return the gap of the shapes in closed form, without a profile, at positions x [m], and y [m] if it is given."""
+        gap = np.zeros(np.broadcast_shapes(x.shape, *(places.shape for places in y.values())))
+        seconds = {}
         for name, shape_keys in self.shapes:
             begin = process_time()
             keys = {key: value for key, value in shape_keys if key != "on"}
-            gap = gap + getattr(contact.gaps, name)(x, **keys)
+            gap = gap + getattr(contact.gaps, name)(x, **keys, **y)
             seconds[name] = process_time() - begin
-
-        # The measured profile.
-        if self.profile is not None:
-            begin = process_time()
-            heights, notes = profiles.compute_profile_gap(
-                self.profile,
-                x,
-                ProfileLengths(self.average, self.limit),
-                float(x[-1] - x[0]) / N_DEFAULT_CELLS,
-                is_rough=self.is_rough,
-                is_material=self.material,
-            )
-            gap = gap + heights
-            seconds["profile"] = process_time() - begin
-        return ShapedGap(gap, notes, seconds)
+        return ShapedGap(gap, (), seconds)
 
 
 def longest_loaded_cell(x, loaded_nodes) -> float:

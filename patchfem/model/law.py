@@ -6,11 +6,11 @@ stiffness of the law.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from .. import friction
-from ..core import PatchfemError
+from ..core import PatchfemError, array_dataclass
 from ..effects import import_effect
 from . import patch as patch_models
 from .source import name_key
@@ -31,7 +31,7 @@ class FrictionLimits(NamedTuple):
     kinetic: float
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class InterfaceLaw:
     """Interface of a rig with its friction law.
 
@@ -40,12 +40,14 @@ class InterfaceLaw:
     - load: normal load [N] of an interface between masses, an estimate until a patch with a prescribed approach is
       pressed; None if the patch or the point of the model carries it.
     - patch: patch that carries `load`; None for a point.
+    - spread_share: fraction of the friction force that acts on the pad (2.15); None without spread.
     """
 
     key: str
     numbers: Friction
     load: float | None
     patch: PatchModel | None = None
+    spread_share: float | None = None
 
     @property
     def partial_slip(self) -> str:
@@ -59,7 +61,14 @@ class InterfaceLaw:
         return FrictionLimits(law.static * load, kinetic * load)
 
 
-def make_effective_law(law: Friction, width: float | None) -> Friction:
+def find_spread_share(law: Friction, width: float | None) -> float | None:
+    """Return the fraction of the friction force that acts on a pad of a width [m] across the path; None without spread."""
+    if law.spread is None:
+        return None
+    return friction.bonds.spread.carried_fraction(width, law.spread)
+
+
+def make_effective_law(law: Friction, spread_share: float | None) -> Friction:
     """Return the keys of a friction law after applying the effects that change its parameters.
 
     `rest_growth` and `slip_growth` are taken at the surface temperature; `static` and `kinetic` are
@@ -69,8 +78,8 @@ def make_effective_law(law: Friction, width: float | None) -> Friction:
     ----------
     law : Friction
         Keys of the friction law.
-    width : float or None
-        Width [m] of the contact across the path.
+    spread_share : float or None
+        Factor of the pad (`find_spread_share`).
 
     Returns
     -------
@@ -81,16 +90,15 @@ def make_effective_law(law: Friction, width: float | None) -> Friction:
     PatchfemError
         If a rate of growth leaves the range of floating-point numbers.
     """
-    if law.temperature is None and law.spread is None:
+    if law.temperature is None and spread_share is None:
         return law
     changes = {"temperature": None, "spread": None}
     if law.temperature is not None and law.rest_growth is not None:
         rest_growth, slip_growth = _scale_growth_rates(law)
         changes |= {"rest_growth": rest_growth, "slip_growth": slip_growth}
-    if law.spread is not None:
-        factor = friction.bonds.spread.carried_fraction(width, law.spread)
-        changes["static"] = law.static * factor
-        changes["kinetic"] = None if law.kinetic is None else law.kinetic * factor
+    if spread_share is not None:
+        changes["static"] = law.static * spread_share
+        changes["kinetic"] = None if law.kinetic is None else law.kinetic * spread_share
     return law.model_copy(update=changes)
 
 
@@ -158,8 +166,10 @@ def build_interface_laws(scene: Scene) -> tuple[InterfaceLaw, ...]:
         return tuple(_build_interface(scene, number) for number in range(len(tables)))
     if scene.friction is None:
         return ()
-    law = make_effective_law(scene.friction, find_pad_width(scene))
-    return (InterfaceLaw("friction", law, None),)
+    contact = scene.contact or scene.normal
+    share = find_spread_share(scene.friction, contact and contact.width)
+    law = make_effective_law(scene.friction, share)
+    return (InterfaceLaw("friction", law, None, spread_share=share),)
 
 
 def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
@@ -169,12 +179,9 @@ def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
     load = table.normal_load
     if load is None:
         load = patch.nominal_load
-    return InterfaceLaw(
-        key=f"structure.interface.{number}",
-        numbers=make_effective_law(table, table.contact and table.contact.width),
-        load=load,
-        patch=patch,
-    )
+    share = find_spread_share(table, table.contact and table.contact.width)
+    law = make_effective_law(table, share)
+    return InterfaceLaw(f"structure.interface.{number}", law, load, patch, share)
 
 
 def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
@@ -198,12 +205,6 @@ def find_normal_load(scene: Scene) -> float | None:
     """Return the (mean) normal load [N] of a scene, or None if the approach is prescribed."""
     contact = scene.contact or scene.normal
     return contact.load if contact is not None else None
-
-
-def find_pad_width(scene: Scene) -> float | None:
-    """Return the width [m] of the contact across the path, or None if the scene gives none."""
-    contact = scene.contact or scene.normal
-    return contact.width if contact is not None else None
 
 
 def make_interface_names(structure) -> list[str]:

@@ -5,14 +5,14 @@ No module after this folder knows a Scene.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
 from math import prod
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..core import PatchfemError
+from ..core import PatchfemError, array_dataclass
 from ..effects import law_has_trait, list_absent_effects, needs_bond_list
 from ..formatting import format_quantity
 from ..scene.keys.memoize import memoize
@@ -20,18 +20,16 @@ from ..scene.keys.tables import Accuracy, Friction
 from ..scene.overrides import replace_number
 from ..scene.rules.methods import MotionFeatures, find_motion_features
 from ..scene.scene import Scene
-from . import load, patch, rig, slide, structure, wear
-from .law import build_interface_laws, find_pad_width, make_bond_parameters
+from . import patch, rig, slide, structure, wear
+from .law import build_interface_laws, make_bond_parameters
 from .source import SceneWriter, Source, locate_errors
 
 if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
     from ..friction.grooves import Grooves
-    from .law import FrictionLimits
-    from .load import PointLoad
-    from .patch import PatchModel
-    from .rig import Rig
-    from .slide import SlidePath
+    from .patch import PatchArea, PatchModel
+    from .rig import BoltedJoint, Rig
+    from .slide import PointLoad, SlidePath
     from .wear import WearModel
 
 # Smallest default [m/s] of the rest speed of bonds in a rig, v_h of eq. 2.10
@@ -54,20 +52,7 @@ class MeasuredFile(NamedTuple):
     cutoff: float | None
 
 
-class _SceneLaw(NamedTuple):
-    """Friction law of the first interface of a scene.
-
-    - friction: effective keys of the law, or None.
-    - spread: spread [m] of the friction over the pad (2.15), or None.
-    - pad: width [m] of the pad across the path, or None.
-    """
-
-    friction: Friction | None = None
-    spread: float | None = None
-    pad: float | None = None
-
-
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Model:
     """Problem that a run solves, in SI units; nothing is solved yet.
 
@@ -75,8 +60,7 @@ class Model:
     - patch: patch that carries the load, or None.
     - point: load on a point if no patch carries it, or None.
     - friction: effective keys of the law of the first interface, or None.
-    - spread: spread [m] of the friction over the pad (2.15), or None.
-    - pad: width [m] of the pad across the path, or None.
+    - spread_share: fraction of the friction force of this law that acts on the pad (2.15); None without spread.
     - slide: prescribed slide of a bench, or None.
     - rig: masses, drive and interfaces of a rig, or None.
     - measured: file of measurements, or None.
@@ -93,8 +77,7 @@ class Model:
     patch: PatchModel | None
     point: PointLoad | None
     friction: Friction | None
-    spread: float | None
-    pad: float | None
+    spread_share: float | None
     slide: SlidePath | None
     rig: Rig | None
     accuracy: Accuracy
@@ -133,21 +116,44 @@ class Model:
         return bool(self.partial_slip or moves or self.side == "lower")
 
     @property
+    def moves(self) -> bool:
+        """Whether the model has a motion, prescribed or driven; otherwise its patch is only pressed."""
+        return self.slide is not None or self.rig is not None
+
+    @property
+    def area(self) -> PatchArea | None:
+        """Cells of the face of [contact]; None for a plane patch, and without [contact]."""
+        return None if self.patch is None else self.patch.area
+
+    @property
+    def patches(self) -> tuple[PatchModel, ...]:
+        """Patches that are pressed: that of [contact], or those of the interfaces of the rig."""
+        interfaces = () if self.rig is None else self.rig.friction.interfaces
+        return tuple(filter(None, (self.patch, *(interface.patch for interface in interfaces))))
+
+    @property
     def has_interface_patches(self) -> bool:
         """Whether at least one interface of the rig has a patch."""
-        if self.rig is None:
-            return False
-        return any(interface.patch is not None for interface in self.rig.friction.interfaces)
+        return self.patch is None and bool(self.patches)
+
+    @property
+    def bolted_joint(self) -> BoltedJoint | None:
+        """Joint that was bolted when the modes were measured, or None."""
+        return None if self.rig is None else self.rig.structure.bolted
 
     @property
     def has_bolted_patch(self) -> bool:
         """Whether the patch of a joint is still to be solved, for modes that were measured with it."""
-        bolted = None if self.rig is None else self.rig.structure.bolted
-        return bolted is not None and bolted.build_rig is not None
+        return self.bolted_joint is not None and self.bolted_joint.build_rig is not None
+
+    def with_bolted(self, bolted: BoltedJoint) -> Model:
+        """Return the model with another joint that was bolted when its modes were measured."""
+        rig = replace(self.rig, structure=replace(self.rig.structure, bolted=bolted))
+        return replace(self, rig=rig)
 
     def describe_removed_joint(self) -> list[str]:
         """Return a list with a sentence on the joint that was subtracted from the modes, or []."""
-        bolted = None if self.rig is None else self.rig.structure.bolted
+        bolted = self.bolted_joint
         if bolted is None or bolted.subtracted is None:
             return []
         texts = [format_quantity(k, "N m-1", 4) for k in bolted.subtracted.stiffness]
@@ -162,7 +168,7 @@ class Model:
         So the resolved scene and the command that repeats a run subtract the same joint again. If each case has its own
         modal test, nothing is stated, because the scene then means its own joint.
         """
-        bolted = None if self.rig is None else self.rig.structure.bolted
+        bolted = self.bolted_joint
         if bolted is None or bolted.origin == "case" or bolted.subtracted is None:
             return self
         writer = self.source.writer._replace(joint=bolted.subtracted.list_values())
@@ -190,10 +196,6 @@ class Model:
         """Bond parameters of the law 'nonlocal' (report, equations 2.10-2.17)."""
         min_rest_speed = 0.0 if self.rig is None else MIN_RIG_REST_SPEED
         return make_bond_parameters(self.friction, self.speed_scale, min_rest_speed)
-
-    def friction_limits(self, load: float) -> FrictionLimits:
-        """Return the static and kinetic friction limit [N] of the first interface of a rig under a load [N]."""
-        return self.rig.friction.interfaces[0].friction_limits(load)
 
 
 def build_without_sweep(scene: Scene) -> Model:
@@ -242,13 +244,14 @@ def _build(scene: Scene) -> Model:
         rig_model = _attach_bolted_model(scene, rig_model)
     point = grooves = None
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
-        point = load.build_point_load(scene, rig_model)
-        grooves = load.build_grooves(scene)
+        point = slide.build_point_load(scene, rig_model)
+        grooves = slide.build_grooves(scene)
 
     # The mesh of a patch is finer where contact edges move, or where partial slip must be resolved
-    law = _build_law(scene, rig_model)
+    laws = build_interface_laws(scene) if rig_model is None else rig_model.friction.interfaces
+    law = laws[0].numbers if laws else None
     if patch_model is not None:
-        if law.friction is not None and law.friction.static == 0:
+        if law is not None and law.static == 0:
             # Without friction no shear stress deforms the pieces.
             still = replace(patch_model.interface, partial_slip="")
             patch_model = replace(patch_model, interface=still)
@@ -259,7 +262,7 @@ def _build(scene: Scene) -> Model:
             area = patch_model.area._replace(max_cells=_find_max_cells(scene, patch_model))
             patch_model = replace(patch_model, area=area)
         elif path is not None and grooves is None:
-            patch_model = _request_slip_mesh(patch_model, path, law.friction)
+            patch_model = _request_slip_mesh(patch_model, path, law)
 
     # The source is added last, because the resolved scene has defaults that follow from the model.
     effects = tuple(scene.effect_names())
@@ -268,7 +271,8 @@ def _build(scene: Scene) -> Model:
         kind=scene.kind,
         patch=patch_model,
         point=point,
-        **law._asdict(),
+        friction=law,
+        spread_share=laws[0].spread_share if laws else None,
         slide=path,
         rig=rig_model,
         accuracy=scene.accuracy,
@@ -378,21 +382,6 @@ def _request_slip_mesh(model: PatchModel, path: SlidePath, law: Friction | None)
         return model
     slip = patch.PrescribedSlip(path.amplitude, law.static, law.bond_length or 0.0)
     return model.with_mesh(slip=slip)
-
-
-def _build_law(scene: Scene, rig_model: Rig | None) -> _SceneLaw:
-    """Build the law of the first interface of a scene: that of `rig_model`, or of [friction].
-
-    It is empty without friction.
-    """
-    laws = build_interface_laws(scene) if rig_model is None else rig_model.friction.interfaces
-    if not laws:
-        return _SceneLaw()
-    tables = () if scene.structure is None else scene.structure.interface
-    if tables:
-        contact = tables[0].contact
-        return _SceneLaw(laws[0].numbers, tables[0].spread, contact and contact.width)
-    return _SceneLaw(laws[0].numbers, scene.friction.spread, find_pad_width(scene))
 
 
 def _build_measured(scene: Scene) -> MeasuredFile | None:

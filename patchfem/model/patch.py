@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
+from ..core import array_dataclass
 from ..mesh.ends import SHARP_END, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material, OnePiece
 from ..scene.keys.quantities import UNIT_FACTORS
 from . import peaks, profile
 from .gap import N_DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap_shapes
 
+FindPath = Callable[[str], Path]  # function of a file name in the scene that returns its path
 # Largest number of cells along the longer side of a face that is only pressed, of one whose slip is followed by parallel
 # elements, of one whose cells are contact points of a law with memory or wear in many jumps, and of one whose cells have
 # lists of bonds; each takes about 10 CPU s.
@@ -199,7 +201,7 @@ class ScanFile(NamedTuple):
     file: str
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class PatchInterface:
     """Interface of a patch: asperity layer and shear compliance.
 
@@ -262,7 +264,7 @@ class PatchMesh:
         return self.element_size is None and self.file is None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class PatchModel:
     """Two pieces that are pressed together.
 
@@ -337,7 +339,7 @@ class PatchModel:
         return replace(self, mesh=replace(self.mesh, **changes))
 
 
-def build_patch(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchModel:
+def build_patch(contact: Contact, resolve_path: FindPath) -> PatchModel:
     """Build the patch that a table [contact] describes.
 
     Parameters
@@ -384,7 +386,7 @@ def build_patch(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchM
     )
 
 
-def _build_area(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchArea | None:
+def _build_area(contact: Contact, resolve_path: FindPath) -> PatchArea | None:
     """Return the cells of a face that a table [contact] describes; None for a plane patch.
 
     `resolve_path` turns a file name in the scene into a path.
@@ -399,7 +401,7 @@ def _build_area(contact: Contact, resolve_path: Callable[[str], Path]) -> PatchA
     return PatchArea(contact.area.cells, contact.area.hardness, scan)
 
 
-def find_mesh_file(contact: Contact, resolve_path: Callable[[str], Path]) -> MeshFile | None:
+def find_mesh_file(contact: Contact, resolve_path: FindPath) -> MeshFile | None:
     """Return the mesh file of a table [contact]; None if the mesh is made from the dimensions.
 
     `resolve_path` turns a file name in the scene into a path.

@@ -7,8 +7,7 @@ from ..core import PatchfemError
 from ..scene.keys.contact import Asperities
 from ..surface.files.read import read_profile
 from ..surface.roughness.peaks import Moments, TraceMoments, gaussian_peaks, trace_moments
-from .file_cache import cache_by_file
-from .source import name_key
+from .source import cache_by_file, name_key
 
 ASPERITY_PREFIX = "contact.asperities."  # prefix of the keys in messages
 

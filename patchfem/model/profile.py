@@ -15,8 +15,7 @@ from ..surface.nodes import MEANS_OVER_WAVES_NOTE, average_at_nodes, place_over_
 from ..surface.profile import Profile, clean, resample_evenly
 from ..surface.roughness.filter import mean_line
 from ..surface.spectrum import MIN_ELEMENTS_PER_WAVE, describe_lost_waves, wave_spectrum
-from .file_cache import cache_by_file
-from .source import name_key
+from .source import cache_by_file, name_key
 
 CURVE_POINTS_PER_CELL = 16  # number of line segments per cell that represent a smooth profile
 # Standard deviation of heights [m] below which they are round-off of a straight line.

@@ -3,24 +3,29 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..core import InitialState, ModalBasis
-from ..effects import Waveform, find_waveform
+from .. import inputs
+from ..core import InitialState, ModalBasis, array_dataclass, max_abs
+from ..effects import Waveform, find_waveform, import_effect
 from ..scene.rules.methods import find_load_change_key
+from ..structure import drives
 from ..structure.drive_sizes import (
+    DriveKeys,
     count_cycles_per_level,
     count_repeat_cycles,
     estimate_peak_speed,
     find_decay_rate,
     find_drive_omega,
+    find_first_period,
     find_max_acceleration,
 )
-from . import structure_reduced
-from .drive import build_signal
+from . import structure_files
 from .law import InterfaceLaw, build_interface_laws, make_interface_names
+from .source import cache_by_file, name_key
 from .structure import (
     SubtractedJoint,
     build_modes,
@@ -38,7 +43,6 @@ from .structure import (
 if TYPE_CHECKING:
     from ..scene.keys.tables import Friction
     from ..structure.drives import DriveSignal
-    from .patch import PatchModel
 
 # Largest displacement [m] up to which a motion that grows without bound is computed.
 MAX_COMPUTED_DISPLACEMENT = 1e3
@@ -68,7 +72,7 @@ class DriveLevels:
     onset: tuple[str, float | None] = ("distortion", None)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class RigDrive:
     """Drive signal of a rig, with its kind, frequency and number of cycles.
 
@@ -90,7 +94,7 @@ class RigDrive:
     levels: DriveLevels = DriveLevels()
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class RigFriction:
     """Friction interfaces of a rig.
 
@@ -133,7 +137,7 @@ class RigSprings:
         return self.cubic is not None or self.interlock is not None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class FirstMode:
     """First elastic mode of the scene, for the rig without the spring of the bonded joint.
 
@@ -179,14 +183,6 @@ class FirstMode:
         return float(np.ptp(slides[:, 1:], axis=0).max(initial=0.0)) / whole_range
 
 
-class JointModel(Protocol):
-    """Model of another scene (`model.Model`), of which the solution of its joint needs the patch and the law."""
-
-    patch: "PatchModel"
-    friction: "Friction"
-    rig: "Rig"
-
-
 class BoltedJoint(NamedTuple):
     """Joint that was bolted when the modes of a rig were measured.
 
@@ -197,7 +193,7 @@ class BoltedJoint(NamedTuple):
       whose stiffness in stick is computed.
     - build_stiffer_rig: the same for a joint that is stiffer by the error of its stiffness, if this stiffness determines
       the slide of the modes, or None.
-    - model: Model of the scene with this joint, or None if it is the model of the rig itself.
+    - model: `model.Model` of the scene with this joint, or None if it is the model of the rig itself.
     - stuck_stiffness: stiffness [N/m] of the solved patch of the rig in full stick, or None without one.
     """
 
@@ -206,11 +202,11 @@ class BoltedJoint(NamedTuple):
     subtracted: SubtractedJoint | None = None
     build_rig: "Callable[[SubtractedJoint], Rig] | None" = None
     build_stiffer_rig: "Callable[[SubtractedJoint], Rig] | None" = None
-    model: JointModel | None = None
+    model: object = None
     stuck_stiffness: float | None = None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class RigStructure:
     """Structure of a rig: its natural frequencies, and where its modes come from.
 
@@ -238,7 +234,7 @@ class RigStructure:
         return self.other_rigs[0] if self.other_rigs else None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Rig:
     """Modes of a structure with the drive signal, the interfaces and the springs.
 
@@ -291,6 +287,11 @@ class Rig:
         frequency = load.frequency if load is not None and load.amplitude else None
         return count_repeat_cycles(self.drive.signal, frequency)
 
+    def with_law(self, law: "Friction") -> "Rig":
+        """Return a copy of the rig whose interfaces have another friction law."""
+        interfaces = tuple(replace(one, numbers=law) for one in self.friction.interfaces)
+        return replace(self, friction=replace(self.friction, interfaces=interfaces))
+
     def with_signal(self, signal, **changes) -> "Rig":
         """Return a copy of the rig with another drive signal; `changes` replace other fields of the drive."""
         return replace(self, drive=replace(self.drive, signal=signal, **changes))
@@ -324,7 +325,7 @@ def build_rig(scene, joint: SubtractedJoint | None = None) -> Rig:
     rig = _build(scene, build_modes_without_bond(scene, joint), interfaces, joint)
     if scene.structure.reduced is None:
         return rig
-    reduced = structure_reduced.build_reduced_modes(scene)
+    reduced = structure_files.build_reduced_modes(scene)
     structure = replace(
         rig.structure,
         other_rigs=tuple(_build(scene, modes, interfaces) for modes in reduced.other_modes),
@@ -409,6 +410,54 @@ def build_drive(scene, modes: ModalBasis) -> RigDrive:
     )
 
 
+def build_signal(scene, modes: ModalBasis):
+    """Build the drive signal of a scene in the form that the solvers use.
+
+    A displacement amplitude X of the base becomes the acceleration amplitude X omega^2, and a force F
+    becomes F over the modal mass. A drive without a frequency of its own gets its cycle from the
+    first elastic mode.
+    """
+    if scene.drive.kind == "free":
+        return drives.make_release(find_first_period(modes))
+    keys = DriveKeys(
+        scene.drive, modes.mass, find_first_period(modes), lambda: _read_recorded_drive(scene)
+    )
+    waveform = scene.drive.waveform
+    return import_effect(f"drive.waveform={waveform}").DRIVE_BUILDERS[waveform](keys)
+
+
+def _read_recorded_drive(scene) -> tuple[np.ndarray, np.ndarray]:
+    """Read both columns (k,) of the file drive.file of a scene.
+
+    They are time [s] and signal, or frequency [Hz] and spectral density. The signal is an acceleration [m s-2] or a
+    force [N], by the kind of the drive.
+    """
+    path = scene.resolve_path(scene.drive.file)
+    with name_key("drive.file"):
+        if find_waveform(scene.drive).is_random:
+            return inputs.signals.read_spectrum(path)
+        return read_drive_file(path, scene.drive.kind)
+
+
+@cache_by_file
+def read_drive_file(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Read a recorded drive signal.
+
+    Parameters
+    ----------
+    path : Path
+        File to read.
+    kind : str
+        ``"base"`` for an acceleration of the base, else the file contains a force.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Time (k,) [s] from 0 on, and acceleration (k,) [m s-2] or force (k,) [N].
+    """
+    return inputs.signals.read_signal(path, "acceleration" if kind == "base" else "force")
+
+
 def _build_springs(structure, modes: ModalBasis) -> RigSprings:
     """Build the springs of a rig beside its modes from the table [structure].
 
@@ -448,7 +497,7 @@ def _build_first_mode(scene, unbonded: ModalBasis, modes: ModalBasis) -> FirstMo
         moves_output = squared[first] > MIN_MODE_OUTPUT_FRACTION * total
         mass = float(unbonded.mass / (squared[first] if moves_output else total))
     contact_mass = 0.0
-    if abs(slide[first]) > MIN_MODE_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
+    if abs(slide[first]) > MIN_MODE_SLIDE_FRACTION * max_abs(slide):
         contact_mass = float(unbonded.mass / max(slide[first] ** 2, 1e-300))
 
     # Both bases describe the same masses, so a least-squares fit converts the coordinates.

@@ -6,18 +6,18 @@ They are cases of a sweep: rigs under a sine, or patches that are pressed togeth
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core import frozen_array
+from ..core import array_dataclass, frozen_array
 from ..scene.rules.methods import find_motion_features
 from . import patch as patches
-from .load import build_point_load
 from .model import Model, write_resolved
 from .rig import build_drive, build_rig
+from .slide import build_point_load
 from .source import SceneWriter, locate_errors
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .rig import Rig
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class SimilarModels(Sequence):
     """Models that differ only in numeric values.
 
@@ -124,8 +124,7 @@ def replace_numbers(
             changes["point"] = build_point_load(scene)
         if model.friction is not None and tables & {"friction", "normal", "contact"}:
             law = changes["friction"] = scene.friction
-            interfaces = tuple(replace(one, numbers=law) for one in rig.friction.interfaces)
-            rig = replace(rig, friction=replace(rig.friction, interfaces=interfaces))
+            rig = rig.with_law(law)
         if "drive" in tables:
             rig = replace(rig, drive=build_drive(scene, rig.modes))
         if "structure" in tables:

@@ -1,14 +1,19 @@
-"""Origin of a model: path, content and effects of the scene, and line numbers for messages."""
+"""Origin of a model: path, content and effects of the scene, line numbers for messages, and cached content of files."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from functools import lru_cache, wraps
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
-from ..core import NotConverged, PatchfemError
+from ..core import NotConverged, PatchfemError, array_dataclass
 from ..scene.lines import locate_key, number_items_from_one
 from ..scene.sets import format_values
+
+# Number of cached results of each function; results for large traces and modes take much memory.
+MAX_CACHED_FILES = 8
+
+Content = TypeVar("Content")  # what a function reads from a file
 
 
 class SceneWriter(NamedTuple):
@@ -23,7 +28,7 @@ class SceneWriter(NamedTuple):
     joint: dict[str, float]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Source:
     """Scene file or text from which a model was built.
 
@@ -98,3 +103,32 @@ def locate_errors(source: Source) -> Iterator[None]:
         if isinstance(error, NotConverged):
             located.partial_result = error.partial_result
         raise located from None
+
+
+def cache_by_file(function: Callable[..., Content]) -> Callable[..., Content]:
+    """Cache the results of a function whose first argument is a path or a tuple of paths.
+
+    A file that has changed its size or its time of modification is read again. Further arguments must
+    be hashable, and are passed by position.
+    """
+
+    @lru_cache(MAX_CACHED_FILES)
+    def call_cached(paths, _versions, *arguments):
+        """Call the function, unless its result is cached for these paths, versions of files and arguments."""
+        return function(paths, *arguments)
+
+    @wraps(function)
+    def read_cached(paths, *arguments):
+        """Return the result for a path or a tuple of `paths`, computed again if a file has changed."""
+        versions = map(_find_version, paths if isinstance(paths, tuple) else (paths,))
+        return call_cached(paths, tuple(versions), *arguments)
+
+    return read_cached
+
+
+def _find_version(path: Path) -> tuple[int, int] | None:
+    """Return time of modification [ns] and size [bytes] of the file `path`, or None if there is none."""
+    if not path.exists():
+        return None
+    stat = path.stat()
+    return stat.st_mtime_ns, stat.st_size

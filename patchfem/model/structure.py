@@ -19,7 +19,7 @@ from ..scene.keys.memoize import memoize
 from ..scene.rules.methods import find_yaw_key
 from ..structure import masses, starts
 from ..structure import modes as listed_modes
-from . import structure_files, structure_reduced
+from . import structure_files
 from .law import InterfaceLaw, build_interface_laws, find_normal_load
 from .source import name_key
 
@@ -281,7 +281,7 @@ def _build_given_modes(scene) -> ModalBasis:
     if structure.mode:
         return _build_listed_modes(structure, scene.drive.kind)
     if structure.reduced is not None:
-        return structure_reduced.build_reduced_modes(scene).modes
+        return structure_files.build_reduced_modes(scene).modes
     if not structure.masses:
         return structure_files.read_scene_modes(scene).modes
     with name_key("structure"):
@@ -289,7 +289,7 @@ def _build_given_modes(scene) -> ModalBasis:
             structure.masses,
             [(spring.between, spring.stiffness) for spring in structure.spring],
             [(damper.between, damper.coefficient) for damper in structure.damper],
-            structure_reduced.list_slide_pairs(structure),
+            structure_files.list_slide_pairs(structure),
             structure.output_mass or 1,
             _find_driven_mass(scene) if scene.drive.kind == "force" else None,
         )

@@ -1,11 +1,14 @@
 """Sweeps over many cases of one mode and one contact point, by steps that end at the events of the law.
 
-1. `laws`                 numbers of the laws
-2. `smooth_laws_kernels`  force of each smooth law at the end of a step
-3. `case_rows`, `case_observers_kernels`, `linear_cases_kernels`, `smooth_cases_kernels`, `case_march_kernels`, `cases`
-   cases with their measures, for laws that are linear between events and for smooth ones
+1. `rows`              columns of all arrays, and the laws
+2. `laws`              numbers of the laws
+3. `law_kernels`       force of each smooth law at the end of a step
+4. `motion_kernels`    pieces of the motion
+5. `observer_kernels`  integrals, extremes and stick of a piece
+6. `march_kernels`     loop over cases, cycles and pieces
+7. `cases`             cases with their measures
 
-A law is a number in `law_rows.Law`, a row of `laws.POINT_LAWS` and branches in `smooth_laws_kernels`, which read first.
+A law is a number in `rows.Law`, a row of `laws.POINT_LAWS` and branches in `law_kernels`; read `motion_kernels` first.
 """
 
 # Names that other folders use, by module.

@@ -13,8 +13,19 @@ from ..motion_measures import (
     measure_interface,
     ratio_or_zero,
 )
-from .case_rows import Cases, Loop, Now, Number, Seen
-from .law_rows import Law, LawNumber, Masing, Memory
+from .rows import (
+    Cases,
+    Energy,
+    Law,
+    LawNumber,
+    Loop,
+    Masing,
+    Memory,
+    Number,
+    PointLaw,
+    Record,
+    Seen,
+)
 
 # Nested reversals that parallel sliders remember. A decay by 3 % from one to the next has reached 2e-7 of its start. After
 # decays of 1000 to 5000 reversals, forces of a motion that grows again are wrong by up to 4e-3 of the limit.
@@ -26,12 +37,15 @@ class CaseMarch(NamedTuple):
 
     - values: measures (c,) by name; NaN where a case does not have the measure
     - extremes (c, n, 2), phasors (c, n): of the output in every cycle [m]
+    - repeat (c,): change of the motion in a cycle, relative to its range, at which it counts as one that repeats; 0 if all
+      cycles are computed
     - stretches (c, 2): mean slide beyond the irreversible slide at the end, in the first and the last measured cycle [m]
     """
 
     values: dict[str, np.ndarray]
     extremes: np.ndarray
     phasors: np.ndarray
+    repeat: np.ndarray
     stretches: np.ndarray
 
 
@@ -83,51 +97,41 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     """
     n = len(cases.parameters)
     columns = cases.parameters.T
-    # The second row of a case is for the cycle before, the first cycle for those before the window.
-    states = np.zeros((n, 2, len(Now)))
-    seen = np.zeros((n, len(Seen)))
-    history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
-    loops = np.full((n, 1 + int(columns[Number.WINDOW].max(initial=0)), len(Loop)), np.nan)
+    n_cycles = int(columns[Number.CYCLES].max(initial=0))
+    record = Record(
+        np.zeros((n, 2, len(Energy))),
+        np.zeros((n, len(Seen))),
+        np.zeros((n, 2), complex),
+        np.zeros((n, n_cycles), complex),
+        np.full((n, n_cycles, len(Loop)), np.nan),
+    )
     is_masing = cases.numbers[0, LawNumber.LAW] == Law.MASING
     memory = np.zeros((n, Masing.STACK + 2 * REVERSALS if is_masing else len(Memory)))
     if is_masing:
         memory[:, Masing.VIRGIN] = 1.0
-    kernels = compiled.load_compiled_module("points.case_march_kernels")
-    kernels.march_cases(
-        steps, cases.parameters, (cases.numbers, memory), states, seen, history, loops
-    )
-    now = states[:, 0]
+    kernels = compiled.load_compiled_module("points.march_kernels")
+    kernels.march_cases(steps, cases.parameters, PointLaw(cases.numbers, memory), record)
 
     output = columns[Number.OUTPUT][:, None]
-    phasors = (history[..., 2] - 1j * history[..., 3]) * columns[Number.OMEGA][:, None] / np.pi
+    extremes = record.loops[..., [Loop.MIN_SLIDE, Loop.MAX_SLIDE]] * output[..., None]
     with np.errstate(all="ignore"):
         return CaseMarch(
-            compute_measures(cases, now, seen, history, loops[:, 1:]),
-            np.sort(history[..., :2] * output[..., None], axis=-1),
-            phasors * output,
-            find_mean_stretches(cases, now, seen, loops),
+            compute_measures(cases, record),
+            np.sort(extremes, axis=-1),
+            record.phasors * columns[Number.OMEGA][:, None] / np.pi * output,
+            record.seen[:, Seen.REPEAT],
+            _find_mean_stretches(cases, record),
         )
 
 
-def find_mean_stretches(cases: Cases, now, seen, loops) -> np.ndarray:
-    """Return `CaseMarch.stretches`.
-
-    Parameters
-    ----------
-    cases : Cases
-        The c cases that were run.
-    now : (c, 18) array
-        States at the end, in the order of `case_rows.Now`.
-    seen : (c, 20) array
-        What was observed, in the order of `case_rows.Seen`.
-    loops : (c, 1 + w, 5) array
-        Cycles of the window, in the order of `case_rows.Loop`, after a row for those before it.
-    """
+def _find_mean_stretches(cases: Cases, record: Record) -> np.ndarray:
+    """Return `CaseMarch.stretches` of the cases that were run."""
     omega = cases.parameters[:, Number.OMEGA]
-    n_measured = np.round(seen[:, Seen.SPAN] * omega / (2 * np.pi)).astype(int)
+    n_measured = np.round(record.seen[:, Seen.SPAN] * omega / (2 * np.pi)).astype(int)
     ends = np.column_stack([-n_measured, np.full(len(omega), -1)])
-    means = np.take_along_axis(loops[..., Loop.SLIDE], ends + loops.shape[1], axis=1)
-    return means * omega[:, None] / (2 * np.pi) - now[:, [Now.SLIP]]
+    integrals = record.loops[..., Loop.SLIDE]
+    means = np.take_along_axis(integrals, ends + integrals.shape[1], axis=1)
+    return means * omega[:, None] / (2 * np.pi) - record.seen[:, [Seen.END_SLIP]]
 
 
 def is_linear_between_events(cases: Cases) -> bool:
@@ -135,44 +139,33 @@ def is_linear_between_events(cases: Cases) -> bool:
     return cases.numbers[0, LawNumber.LAW] <= Law.JENKINS
 
 
-def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.ndarray]:
-    """Return the measures (c,) of a sweep row by name.
-
-    Parameters
-    ----------
-    cases : Cases
-        The cases that were run.
-    now : (c, 18) array
-        States at the end, in the order of `case_rows.Now`.
-    seen : (c, 20) array
-        What was observed, in the order of `case_rows.Seen`.
-    history : (c, n, 4) array
-        Extremes and phasor of every cycle.
-    loops : (c, w, 5) array
-        Cycles of the window, in the order of `case_rows.Loop`.
-    """
+def compute_measures(cases: Cases, record: Record) -> dict[str, np.ndarray]:
+    """Return the measures (c,) of a sweep row by name, of the c cases that were run."""
     columns = cases.parameters.T
     omega = columns[Number.OMEGA]
+    seen = record.seen
     span = seen[:, Seen.SPAN]
-    output = history[:, -loops.shape[1] :, :2] * columns[Number.OUTPUT][:, None, None]
+    loops = record.loops[:, -int(columns[Number.WINDOW].max(initial=0)) :]
+    low = loops[..., Loop.MIN_SLIDE].min(axis=1)
+    high = loops[..., Loop.MAX_SLIDE].max(axis=1)
     work = seen[:, Seen.WORK]
-    energies = _compute_energies(cases, now)
+    energies = _compute_energies(cases, record)
     exchanged = seen[:, Seen.PASSED] + energies["power"] + energies["peak_stored"]
 
     values = {
-        "relative_displacement_amplitude": np.ptp(output, axis=(1, 2)) / 2,
+        "relative_displacement_amplitude": np.abs(columns[Number.OUTPUT]) * (high - low) / 2,
         "absolute_acceleration_peak": seen[:, Seen.MAX_ACCELERATION],
         "normal_load": columns[Number.LOAD],
         "work_check": ratio_or_zero(np.abs(seen[:, Seen.SAMPLED] - work), exchanged),
         "energy_balance": energy_balance(energies),
         "friction_work": energies["friction"],
-        "energy_dissipated": energies["friction"] - now[:, Now.ELASTIC],
+        "energy_dissipated": energies["friction"] - record.energies[:, 0, Energy.ELASTIC],
         "energy_created": np.zeros_like(work),
     }
     # The time of stick in place of the phase of the drive that passes during stick.
-    stick = seen[:, Seen.STUCK : Seen.SLIP_START_PHASE_SIN + 1].T.copy()
+    stick = seen[:, Seen.STUCK : Seen.SIN_START + 1].T.copy()
     stick[0] /= omega
-    harmonics = find_harmonics(cases, now, seen)
+    harmonics = find_harmonics(cases, record)
     observations = Observations(
         span=span,
         period=2 * np.pi / omega,
@@ -187,24 +180,15 @@ def compute_measures(cases: Cases, now, seen, history, loops) -> dict[str, np.nd
     return values | measure_acceleration(harmonics.acceleration, harmonics.third, span)
 
 
-def _compute_energies(cases: Cases, now) -> dict[str, np.ndarray]:
-    """Return the energies (c,) [J] of the whole run by name, for the balance of `motion_measures`.
-
-    `now` (c, 18) are the states of the cases at the end, in the order of `case_rows.Now`. Energies in `now` and in the
-    parameters are per unit of the moving mass.
-    """
+def _compute_energies(cases: Cases, record: Record) -> dict[str, np.ndarray]:
+    """Return the energies (c,) [J] of the whole run by name, for the balance of `motion_measures`."""
     columns = cases.parameters.T
     stiffness = columns[Number.STIFFNESS]
-    last = now[:, Now.VELOCITY] ** 2 + stiffness * now[:, Now.SLIDE] ** 2
+    seen = record.seen.T
+    last = seen[Seen.END_VELOCITY] ** 2 + stiffness * seen[Seen.END_SLIDE] ** 2
     first = columns[Number.VELOCITY] ** 2 + stiffness * columns[Number.SLIDE] ** 2
-    energies = {
-        "work_in": now[:, Now.WORK_IN],
-        "viscous": now[:, Now.VISCOUS],
-        "power": now[:, Now.POWER],
-        "friction": now[:, Now.FRICTION],
-        "stored": 0.5 * (last - first),
-        "peak_stored": now[:, Now.STORED],
-    }
+    names = ("work_in", "power", "viscous", "friction", "peak_stored")
+    energies = dict(zip(names, record.energies[:, 0].T)) | {"stored": 0.5 * (last - first)}
     return {name: energy / columns[Number.MOBILITY] for name, energy in energies.items()}
 
 
@@ -222,35 +206,26 @@ class Harmonics(NamedTuple):
     third: np.ndarray
 
 
-def find_harmonics(cases: Cases, now, seen) -> Harmonics:
+def find_harmonics(cases: Cases, record: Record) -> Harmonics:
     """Return the `Harmonics` of cases by integration by parts from the slide.
 
     Over a window of whole cycles, the integral of q'' exp(-i w t) is [q'] + i w ([q] + i w Q) with the integral Q of
     q exp(-i w t), where [x] is the change of x over the window. That of the friction force follows from the equation of
     motion q'' + c q' + k q = d sin(omega t) - mobility F. A sine of amplitude a has the integral -i a span/2 at w = omega.
-
-    Parameters
-    ----------
-    cases : Cases
-        The c cases that were run.
-    now : (c, 18) array
-        States at the end, in the order of `case_rows.Now`.
-    seen : (c, 20) array
-        What was observed, in the order of `case_rows.Seen`.
     """
     columns = cases.parameters.T
-    q_jump = now[:, Now.SLIDE] - seen[:, Seen.START_SLIDE]
-    v_jump = now[:, Now.VELOCITY] - seen[:, Seen.START_VELOCITY]
-    sine = -0.5j * seen[:, Seen.SPAN]
+    seen = record.seen.T
+    q_jump = seen[Seen.END_SLIDE] - seen[Seen.START_SLIDE]
+    v_jump = seen[Seen.END_VELOCITY] - seen[Seen.START_VELOCITY]
+    sine = -0.5j * seen[Seen.SPAN]
 
-    slide = seen[:, Seen.COS_1] - 1j * seen[:, Seen.SIN_1]
+    slide, slide_3 = record.harmonics.T
     w = 1j * columns[Number.OMEGA]
     velocity = q_jump + w * slide
     acceleration = v_jump + w * velocity
     force = sine * columns[Number.DRIVE] - acceleration
     force -= columns[Number.DAMPING] * velocity + columns[Number.STIFFNESS] * slide
 
-    slide_3 = seen[:, Seen.COS_3] - 1j * seen[:, Seen.SIN_3]
     third = v_jump + 3 * w * (q_jump + 3 * w * slide_3)
     ratio = columns[Number.OUTPUT]
     return Harmonics(

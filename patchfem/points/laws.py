@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..core import MIN_LOAD
-from .law_rows import Law
+from .rows import Law
 
 MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
 # Number of each law, and the attributes of a law of `friction` in the order of its numbers; those with a star are per

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ..convergence import MAX_CONVERGENCE_ORDER, convergence_error
+from ..core import max_abs
 from ..motion_measures import find_reversal_steps
 from .measures import ArrayPair
 
@@ -117,7 +118,7 @@ def locate_reversals(time, position, speed) -> ArrayPair:
         Samples of time [s], position [m] and speed [m/s] at any spacing, with at most one reversal
         between two samples.
     """
-    speed = np.where(np.abs(speed) <= REST_SPEED_TOL * np.abs(speed).max(initial=0.0), 0.0, speed)
+    speed = np.where(np.abs(speed) <= REST_SPEED_TOL * max_abs(speed), 0.0, speed)
     resting_samples = np.flatnonzero(speed == 0)
     inside = find_reversal_steps(time, position, speed)
     step_times = time[inside.step] + inside.fraction * np.diff(time)[inside.step]
@@ -160,7 +161,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     first = 0 if durations[0] >= MIN_HALF_DURATION * durations[1] else 1
     if len(turns) < first + 3:
         return None
-    return float(np.abs(np.diff(places[turns[first : first + 3]])).max()) / 2
+    return max_abs(np.diff(places[turns[first : first + 3]])) / 2
 
 
 def _find_last_turns(places, ripple: float) -> list[int]:

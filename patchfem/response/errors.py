@@ -145,26 +145,10 @@ def estimate_sampling_errors(values: Values) -> Values:
     return errors
 
 
-class FrictionScale(NamedTuple):
-    """Reference values that turn a relative error of the friction force into absolute errors of measures.
-
-    - static: coefficient of static friction [1].
-    - limit: friction limit [N].
-    - bond_length: stretch of a bond at the limit [m].
-    - work, cycle_work: sum of the absolute friction work in the whole run and in a cycle [J].
-    """
-
-    static: float
-    limit: float
-    bond_length: float
-    work: float
-    cycle_work: float
-
-
 def compute_friction_errors(values: Values, fraction: float, law, load: float, works) -> Values:
     """Return the errors of the measures caused by a relative error of the friction force.
 
-    The error of a measure is `fraction` times a reference value: the friction limit, the bond
+    The error of a measure is `fraction` times the size that its row names: the friction limit, the bond
     length, the exchanged work, or the energy of a bond at the limit. For other measures, it is
     `fraction` times the value.
 
@@ -181,13 +165,19 @@ def compute_friction_errors(values: Values, fraction: float, law, load: float, w
     works : (2,)
         Sums of the absolute friction work in the whole run and in a cycle [J].
     """
-    scale = FrictionScale(law.static, law.static * load, law.bond_length, *works)
-    errors = {}
-    for name, value in values.items():
-        find_scale = find_definition(name).friction_scale
-        size = abs(value) if find_scale is None else find_scale(scale)
-        errors[name] = fraction * size
-    return errors
+    limit = law.static * load
+    sizes = {
+        "none": 0.0,
+        "one": 1.0,
+        "static": law.static,
+        "limit": limit,
+        "bond_length": law.bond_length,
+        "bond_energy": limit * law.bond_length,
+        "work": works[0],
+        "cycle_work": works[1],
+    }
+    scales = {name: find_definition(name).friction_scale for name in values}
+    return {name: fraction * sizes.get(scales[name], abs(values[name])) for name in values}
 
 
 def add_errors(

@@ -6,11 +6,11 @@ eigenvectors of the rig with its interfaces as springs, and the two levels that 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from ..core import array_dataclass
 from ..formatting import format_length
 from .measures import Values, estimate_slip_round_off
 from .rows import AMPLITUDE, select_names
@@ -176,7 +176,7 @@ LEVEL_MEASURES = select_names("level")
 MIN_SLIP_DISTORTION = 0.03
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Level:
     """Measures and state of a run at the end of one drive level.
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import max_abs
 from ..effects import law_has_trait
 from ..motion_measures import find_reversal_steps, measure_loop
 from .measures import MODAL_COORDINATE_ROUND_OFF, Values, compute_harmonic
@@ -21,17 +22,6 @@ SAME_EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event
 REST_SLIDE_RATE_TOL = 1e-9
 # Largest displacement in a time step that counts as rest, relative to that in any step.
 MIN_MOVING_STEP_RATIO = 1e-3
-
-
-class Reversal(NamedTuple):
-    """A reversal of the relative displacement.
-
-    - slide: relative displacement [m].
-    - force: friction force [N], or None if it is unknown, e.g. if the interface is at rest at an end of the window.
-    """
-
-    slide: float
-    force: float | None
 
 
 def find_cycle_spans(time, period: float) -> list[tuple[float, float]]:
@@ -62,10 +52,10 @@ def choose_reversal_force_rule(model) -> str:
     )
 
 
-def find_reversals(
-    time, slide, rate, force, period: float, rule: str = "rate"
-) -> list[tuple[Reversal, ...]]:
-    """Return the smallest and the largest `Reversal` of the displacement in each cycle.
+def find_reversals(time, slide, rate, force, period: float, rule: str = "rate") -> np.ndarray:
+    """Return the smallest slide [m] with the force [N] there, and the largest slide with its force, in each cycle (c, 4).
+
+    An unknown force is NaN, e.g. if the interface is at rest at an end of the window.
 
     Parameters
     ----------
@@ -76,16 +66,16 @@ def find_reversals(
     rule : str
         Rule for the force at a reversal. "jumps": mean of the forces before and after the rest;
         "slide": force at the sample with the largest displacement, extrapolated linearly in the
-        displacement; "rate": force interpolated linearly in time. The force is None if the
+        displacement; "rate": force interpolated linearly in time. The force is NaN if the
         displacement is largest at an end of the cycle and does not reverse within one step of it.
     """
-    reversals = []
+    spans = find_cycle_spans(time, period)
+    reversals = np.full((len(spans), 4), np.nan)
     time_tolerance = SAME_EVENT_TIME_TOL * period
-    for begin, end in find_cycle_spans(time, period):
+    for row, (begin, end) in zip(reversals, spans):
         cycle = slice(*np.searchsorted(time, [begin - time_tolerance, end + time_tolerance]))
-        pair = []
         # The smallest displacement is the largest one of the motion -q(t).
-        for sign in (-1, 1):
+        for column, sign in ((0, -1), (2, 1)):
             sample, value, fraction = _find_largest(
                 time[cycle], sign * slide[cycle], sign * rate[cycle], time_tolerance
             )
@@ -94,13 +84,11 @@ def find_reversals(
                 sample, fraction = _find_velocity_zero(
                     sign * rate, sample, first=sample == cycle.start
                 )
-            force_there = None
+            row[column] = sign * value
             if sample is not None:
-                force_there = _find_force_at_reversal(
+                row[column + 1] = _find_force_at_reversal(
                     sign * slide, force, sample, fraction, value, rule
                 )
-            pair.append(Reversal(sign * value, force_there))
-        reversals.append(tuple(pair))
     return reversals
 
 
@@ -138,7 +126,7 @@ def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, flo
     Returns the index of the preceding sample and the position as a fraction of the step, or (None, 0) without a zero.
     """
     k = sample - 1 if first else sample
-    if abs(v[sample]) <= REST_SLIDE_RATE_TOL * np.abs(v).max(initial=0.0):
+    if abs(v[sample]) <= REST_SLIDE_RATE_TOL * max_abs(v):
         return sample, 0.0
     if 0 <= k < v.size - 1 and v[k] > 0 >= v[k + 1]:
         return k, float(v[k] / (v[k] - v[k + 1]))
@@ -147,8 +135,8 @@ def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, flo
 
 def _find_force_at_reversal(
     slide, force, sample: int, fraction: float, value: float, rule: str
-) -> float | None:
-    """Return the friction force [N] at the largest relative displacement, or None if it is unknown.
+) -> float:
+    """Return the friction force [N] at the largest relative displacement, or NaN if it is unknown.
 
     `slide` (k,) [m] and `force` (k,) [N] are samples. The largest displacement `value` lies in the step after a sample,
     at the fraction `fraction` of the step. The rule is as in `find_reversals`.
@@ -166,7 +154,7 @@ def _find_force_at_reversal(
     return float(force[peak] + (force[peak] - force[sample - 1]) * (value - slide[peak]) / rise)
 
 
-def _find_force_around_rest(slide, force, sample: int, value: float) -> float | None:
+def _find_force_around_rest(slide, force, sample: int, value: float) -> float:
     """Return the mean of the friction forces [N] before and after a rest at a reversal.
 
     Parameters
@@ -180,38 +168,19 @@ def _find_force_around_rest(slide, force, sample: int, value: float) -> float | 
 
     Returns
     -------
-    float or None
-        None if there is no motion before or after the rest.
+    float
+        NaN if there is no motion before or after the rest.
     """
     step = np.abs(np.diff(slide))
     is_moving = step > MIN_MOVING_STEP_RATIO * step.max(initial=0.0)
     is_moving &= np.maximum(
         np.abs(slide[1:] - value), np.abs(slide[:-1] - value)
-    ) > MODAL_COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
+    ) > MODAL_COORDINATE_ROUND_OFF * max_abs(slide)
     before = np.flatnonzero(is_moving[:sample])
     after = np.flatnonzero(is_moving[sample:])
     if not before.size or not after.size:
-        return None
+        return np.nan
     return float(force[before[-1]] + force[sample + after[0] + 1]) / 2
-
-
-def compute_mean_half_range(reversals) -> float:
-    """Return half the range of the relative displacement [m], averaged over the cycles."""
-    if not reversals:
-        return 0.0
-    return float(np.mean([high.slide - low.slide for low, high in reversals])) / 2
-
-
-def compute_secant_stiffness(reversals) -> float | None:
-    """Return the secant stiffness (F(q_max) - F(q_min))/2A [N/m], averaged over the cycles.
-
-    The result is None if the interface is at rest in all cycles, or if no cycle has both forces.
-    """
-    stiffnesses = []
-    for low, high in reversals:
-        if high.slide > low.slide and None not in (low.force, high.force):
-            stiffnesses.append((high.force - low.force) / (high.slide - low.slide))
-    return float(np.mean(stiffnesses)) if stiffnesses else None
 
 
 class CycleLoop(NamedTuple):
@@ -248,32 +217,20 @@ def sample_loop(time, slide, force, omega: float, work: float) -> CycleLoop:
     return CycleLoop(compute_harmonic(time, weight, moved, omega), force, work)
 
 
-def compute_interface_loop(
-    amplitude: float, q: complex, f: complex, work: float, stiffness: float
-) -> Values:
-    """Return loop area, equivalent stiffness and equivalent damping of an interface as a dict.
-
-    The equivalent stiffness is Re(F1/q1), as in harmonic balance.
+def measure_sampled_loop(reversals, loop: CycleLoop, stiffness: float) -> Values:
+    """Return the measures of a friction loop by name (`motion_measures.measure_loop`), without those that have no value.
 
     Parameters
     ----------
-    amplitude : float
-        Half the range A of the relative displacement in a cycle [m].
-    q, f : complex
-        First Fourier coefficients of relative displacement [m] and friction force [N].
-    work : float
-        Friction work W per cycle [J].
+    reversals : (c, 4) array
+        Reversals in each cycle (`find_reversals`); those of an interface at rest are empty.
+    loop : CycleLoop
+        First harmonics and work of the loop.
     stiffness : float
         Stiffness K = moving_mass omega_1^2/slide_1^2 of the first mode at the contact [N/m]; 0 if no
         damping is computed.
-
-    Returns
-    -------
-    dict
-        "loop_area" [J], "equivalent_stiffness" and "harmonic_force_ratio" |F1/q1| [N/m], and
-        "equivalent_damping" W/(2 pi K A^2) [1]; without measures that have no value.
     """
-    values = measure_loop(amplitude, q, f, work, stiffness)
+    values = measure_loop(reversals, *loop, stiffness)
     return {name: float(value) for name, value in values.items() if not np.isnan(value)}
 
 

@@ -7,7 +7,7 @@ definitions of the measures.
 import numpy as np
 
 from .. import friction
-from ..core import Measure, Response, add_interface_number
+from ..core import Measure, Response, add_interface_number, max_abs
 from ..motion_measures import (
     MAX_RESTING_SLIDE_RANGE,
     MIN_ENERGY_DIFFERENCE,
@@ -126,7 +126,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     slip_steps = np.abs(np.diff(slip[last_cycles]))
     slide_steps = np.abs(np.diff(window.slide[last_cycles]))
     time = window.time[last_cycles]
-    is_moving = slide_steps > MODAL_COORDINATE_ROUND_OFF * np.abs(window.slide).max()
+    is_moving = slide_steps > MODAL_COORDINATE_ROUND_OFF * max_abs(window.slide)
     ratio = np.divide(slip_steps, slide_steps, out=np.zeros(time.size - 1), where=is_moving)
     excess = ratio - MAX_STICKING_SLIP_FRACTION
 
@@ -152,7 +152,7 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
 
 def estimate_slip_round_off(window: Response) -> float:
     """Return the slip [m] in the window of a run that may be round-off of the modal coordinates."""
-    return MODAL_COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
+    return MODAL_COORDINATE_ROUND_OFF * max_abs(window.modal)
 
 
 def average_slip_starts(phases) -> Values:

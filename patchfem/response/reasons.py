@@ -12,17 +12,15 @@ from .. import structure
 from ..core import Measure, Outcome
 from ..formatting import format_number
 from .measures import Measures
-from .rows import MOTION_TABLE, STEADY_AMPLITUDE
+from .rows import MOTION_TABLE, STEADY_AMPLITUDE, select_names
 
-ACCELERATION_MEASURES = ("absolute_acceleration_fundamental", "acceleration_distortion")
 # Largest contribution of other modes to the relative displacement, as a fraction, at which the
 # damping ratio is attributed to mode 1.
 MAX_OTHER_MODES_FRACTION = 0.05
-PERIODIC_MEASURES = (
-    "equivalent_stiffness",
-    "secant_stiffness",
-    "equivalent_damping",
-    *ACCELERATION_MEASURES,
+CYCLE_MEASURES = select_names("cycle")
+# The first of them is the amplitude of the other.
+ACCELERATION_MEASURES = tuple(
+    name for name in CYCLE_MEASURES if MOTION_TABLE[name].group == "motion"
 )
 ALWAYS_STICKS_REASON = "the whole interface sticks throughout the last cycles"
 UNBOUNDED_REASON = "no bounded motion exists at this drive"
@@ -69,7 +67,7 @@ def find_missing(
         Fraction of the relative displacement due to modes other than the first [1].
     """
     reasons = {}
-    for name in PERIODIC_MEASURES if has_loaded_interface else ACCELERATION_MEASURES:
+    for name in CYCLE_MEASURES if has_loaded_interface else ACCELERATION_MEASURES:
         reasons[name] = _explain_missing_cycle_value(
             name, values, window, drive, other_modes_fraction
         )
@@ -151,7 +149,7 @@ def _list_open_loops(measures: Measures, window, drive) -> list[str]:
     _, stored, dissipated, created = np.abs(ledger[:, -1] - ledger[:, 0])
     areas = {name: one for name, one in measures.items() if name.startswith("loop_area")}
     if len(areas) == 1:
-        cycles = (window.time[-1] - window.time[0]) / drive.period
+        cycles = window.span / drive.period
         return list(areas) if stored > max(dissipated, loop.floor * cycles) else []
     if created > 1e-9 * (stored + dissipated):
         return []

@@ -1,28 +1,30 @@
-"""Table of the measures of a motion, for the solutions of all engines.
+"""Rows of the measures of a motion, for the solutions of all engines.
 
 In: a `LastCycles`, i.e. the last cycles of a run with the values that its engine integrated. Out:
-values by name, and the definition, floor and larger term of each measure. A row has a name, a unit,
-the absolute floor of the error, a definition in one sentence, and a function of a `LastCycles`. A new
-measure is a new row of SINGLE_RUN_ROWS.
+values by name, and the definition, floor and larger term of each measure. measures.toml has name, unit, floor and
+definition of each measure; a measure of your own is a row of SINGLE_RUN_ROWS.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from .. import structure
-from ..core import MeasureDefinition, Response, add_interface_number, remove_interface_number
+from ..core import (
+    MeasureDefinition,
+    Response,
+    add_interface_number,
+    read_measure_rows,
+    remove_interface_number,
+)
 from ..motion_measures import MAX_RESTING_SLIDE_RANGE, energy_balance, ratio_or_zero
 from . import stationary
 from .loops import (
-    Reversal,
-    compute_interface_loop,
     compute_mean_drift,
-    compute_mean_half_range,
-    compute_secant_stiffness,
     find_reversals,
+    measure_sampled_loop,
 )
 from .measures import (
     Measures,
@@ -31,7 +33,7 @@ from .measures import (
     compute_peak,
     compute_slip_measures,
 )
-from .spectrum import MIN_MOVING_HARMONIC, find_acceleration_harmonics, make_acceleration_measures
+from .spectrum import find_acceleration_harmonics, make_acceleration_measures
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,7 @@ class LastCycles:
     @cached_property
     def span(self) -> float:
         """Duration of the window [s]."""
-        return self.window.time[-1] - self.window.time[0]
+        return self.window.span
 
     @cached_property
     def slip_measures(self) -> Values:
@@ -88,8 +90,8 @@ class LastCycles:
         return compute_slip_measures(window, self.drive, steps)
 
     @cached_property
-    def reversals(self) -> list[tuple[Reversal, ...]]:
-        """Reversal at the smallest and at the largest displacement in each complete cycle."""
+    def reversals(self) -> np.ndarray:
+        """Smallest and largest slide [m], each with the force there [N], in each complete cycle (c, 4)."""
         w = self.window
         return find_reversals(
             w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.reversal_rule
@@ -107,12 +109,8 @@ class LastCycles:
         is_moving = self.is_sine and np.ptp(self.window.slide) > max(
             2 * self.slide_round_off, MAX_RESTING_SLIDE_RANGE
         )
-        if not is_moving:
-            return compute_interface_loop(0.0, *self.loop, self.stiffness)
-        measures = compute_interface_loop(
-            compute_mean_half_range(self.reversals), *self.loop, self.stiffness
-        )
-        return measures | {"secant_stiffness": compute_secant_stiffness(self.reversals)}
+        reversals = self.reversals if is_moving else np.empty((0, 4))
+        return measure_sampled_loop(reversals, self.loop, self.stiffness)
 
     @cached_property
     def acceleration_measures(self) -> Values:
@@ -186,411 +184,63 @@ class LastCycles:
 
 
 def _find_drift_scale(values: Values):
-    """Return the amplitude [m] with which the drift of an interface is compared.
+    """Return the amplitude [m] with which the drift of an interface is compared: that of the slip, or else of the motion.
 
-    The scale is the slip amplitude, or without slip the amplitude of the motion.
-
-    Parameters
-    ----------
-    values : dict
-        Measures of one run, or (n,) of n runs.
+    `values` are the measures by name of one run, or (n,) of n runs.
     """
     slip = np.abs(np.nan_to_num(np.asarray(values.get("slip_amplitude", 0.0), float)))
     return np.where(slip > 0, slip, np.abs(values.get(AMPLITUDE, 0.0)))
-
-
-def _make_random_rows(
-    name: str, unit: str, floor: float, definition: str, group: str = "motion"
-) -> tuple[MeasureDefinition, MeasureDefinition]:
-    """Return the definitions of a measure under a random drive and of its statistical scatter.
-
-    Parameters
-    ----------
-    name : str
-        Name of the measure. The scatter is named NAME_scatter.
-    unit : str
-        SI unit of both.
-    floor : float
-        Absolute error that is allowed in addition to a tolerance times the value.
-    definition : str
-        What the measure is.
-    group : str
-        Group of measures in which both are printed.
-    """
-    scatter = f"{name}_scatter"
-    value_row = MeasureDefinition(
-        name, unit, floor, definition, "random_response_measures", group=group
-    )
-
-    # The tolerance of a scatter refers to its measure, because the scatter itself may be near 0.
-    scatter_row = MeasureDefinition(
-        scatter,
-        unit,
-        floor,
-        f"half-width of the 95 % interval of {name}: the scatter between "
-        "random drives of the same length with different seeds",
-        "random_response_measures",
-        group=group,
-        larger_term=(name, lambda values: np.abs(values.get(name, 0.0))),
-    )
-    return value_row, scatter_row
 
 
 AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
 STICK_FRACTION = "stick_fraction"
 SLIP_START_PHASE = "slip_start_phase"
 STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapolated
+# Functions of a LastCycles that return the measures which are not in one of its groups of values
+FUNCTIONS = {
+    AMPLITUDE: lambda s: np.ptp(s.extremes) / 2 if s.release is None else s.release,
+    "absolute_acceleration_peak": lambda s: compute_peak(s.window.acceleration),
+    "friction_force_peak": lambda s: None if s.load is None else compute_peak(s.window.force),
+    "energy_balance": lambda s: energy_balance(s.run_energies),
+    "drift_per_cycle": lambda s: compute_mean_drift(
+        s.window.time, s.window.slide, s.window.slide_rate, s.drive.period
+    ),
+    "normal_load": lambda s: s.load,
+    "normal_load_least": lambda s: s.evaluate_load(np.min),
+    "normal_load_peak": lambda s: s.evaluate_load(np.max),
+    "open_fraction": lambda s: s.evaluate_load(lambda load: np.mean(load <= 0)),
+}
+# Sizes of the larger terms by their names in measures.toml, or functions of the measures of an interface that return them
+LARGER_TERMS = {"1": 1.0, "pi": np.pi}
+LARGER_TERM_FUNCTIONS = {
+    "drift_per_cycle": _find_drift_scale,
+    "equivalent_stiffness": lambda values: np.nan_to_num(values.get("harmonic_force_ratio", 0.0)),
+}
+SCATTER_TEXT = (
+    "half-width of the 95 % interval of {}: the scatter between random drives of the same length with "
+    "different seeds"
+)
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
-UNIT_LARGER_TERM = ("1", lambda _: 1.0)  # larger term of a fraction and of a relative difference
-# Order of convergence of values that are interpolated by cubics between samples.
-CUBIC_CONVERGENCE_ORDER = 4.0
-MOTION_MEASURE_ROWS = (
-    MeasureDefinition(
-        AMPLITUDE,
-        "m",
-        1e-10,
-        "half the peak-to-peak displacement at the output, relative to "
-        "the base; of a release, that of the last whole cycle of the "
-        "motion, from a reversal to the second reversal after it, without "
-        "ripples below a quarter of the range in the last period",
-        lambda s: np.ptp(s.extremes) / 2 if s.release is None else s.release,
-        flags="main level curve displacement",
-    ),
-    MeasureDefinition(
-        "absolute_acceleration_peak",
-        "m s-2",
-        1e-4,
-        "largest acceleration at the output, base motion included",
-        lambda s: compute_peak(s.window.acceleration),
-        flags="main level curve",
-    ),
-    MeasureDefinition(
-        "friction_force_peak",
-        "N",
-        1e-6,
-        "largest friction force on the whole interface, of a bench during the whole run",
-        lambda s: None if s.load is None else compute_peak(s.window.force),
-        group="friction",
-        flags="interface level loop force",
-        friction_scale=lambda scale: scale.limit,
-    ),
-    MeasureDefinition(
-        "energy_balance",
-        "1",
-        1e-8,
-        "error of the energy balance over the run: work minus stored energy minus dissipated energy, divided by the "
-        "sum of the exchanged energy and the largest stored energy",
-        lambda s: energy_balance(s.run_energies),
-        group="energy",
-        larger_term=UNIT_LARGER_TERM,
-        flags="error",
-        friction_scale=lambda _: 0.0,
-    ),
-    MeasureDefinition(
-        "absolute_acceleration_fundamental",
-        "m s-2",
-        MIN_MOVING_HARMONIC,
-        "first harmonic of the acceleration at the output, base motion included",
-        "acceleration_measures",
-        flags="level curve sine",
-    ),
-    MeasureDefinition(
-        "acceleration_distortion",
-        "1",
-        1e-6,
-        "third harmonic of the acceleration at the output, base motion included, divided by the first harmonic; null "
-        "if the output does not move",
-        "acceleration_measures",
-        flags="level curve sine",
-    ),
-    MeasureDefinition(
-        "drift_per_cycle",
-        "m",
-        1e-11,
-        "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
-        "first cycle of the window)/(number of cycles between these two cycles); null unless drive and load repeat in "
-        "every cycle at the end of the run",
-        lambda s: compute_mean_drift(
-            s.window.time, s.window.slide, s.window.slide_rate, s.drive.period
-        ),
-        larger_term=("slip amplitude (without slip: amplitude of the motion)", _find_drift_scale),
-        order=CUBIC_CONVERGENCE_ORDER,
-        flags="displacement",
-    ),
-    MeasureDefinition(
-        "slip_amplitude",
-        "m",
-        1e-10,
-        "half the peak-to-peak value of the irreversible part of the slide; for a patch, the mean over its points, "
-        "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces",
-        "slip_measures",
-        group="friction",
-        flags="interface level displacement loop",
-        friction_scale=lambda scale: scale.bond_length,
-    ),
-    MeasureDefinition(
-        STICK_FRACTION,
-        "1",
-        1e-3,
-        "fraction of the time of the last cycles during which the interface as a whole sticks; the interface sticks "
-        "as a "
-        "whole while more than half of the change of the slide (weighted as in `slip_amplitude`) is elastic; part of a "
-        "patch, or some sliders of law 'iwan', may slip during this time",
-        "slip_measures",
-        0.35,
-        group="friction",
-        larger_term=UNIT_LARGER_TERM,
-        flags="interface level",
-    ),
-    MeasureDefinition(
-        SLIP_START_PHASE,
-        "rad",
-        1e-3,
-        "phase of the drive (of the base displacement, or of the force) at which slip starts after stick, modulo pi; "
-        "slip is the weighted mean defined under `slip_amplitude`; the phase is printed in degrees; null if slip "
-        "starts at different phases of a half cycle",
-        "slip_measures",
-        1.0,
-        group="friction",
-        larger_term=("pi", lambda _: np.pi),
-        flags="sine phase",
-    ),
-    MeasureDefinition(
-        "normal_load",
-        "N",
-        0.0,
-        "normal load on the interface, summed over all equal patches (key `pairs`)",
-        lambda s: s.load,
-        group="friction",
-        friction_scale=lambda _: 0.0,
-    ),
-    MeasureDefinition(
-        "loop_area",
-        "J",
-        1e-10,
-        "friction work per cycle in this interface alone (the energy dissipated, if the loop closes); null if the drive "
-        "is not periodic and the friction loop does not close, because the interface then stores or returns more energy "
-        "than it dissipates",
-        "loop_measures",
-        group="energy",
-        flags="main interface level loop",
-        friction_scale=lambda scale: scale.cycle_work,
-    ),
-    MeasureDefinition(
-        "equivalent_stiffness",
-        "N m-1",
-        1.0,
-        "part of the first harmonic of the friction force that is in phase with the slide, divided by the first "
-        "harmonic of the slide; negative if friction keeps the spring of the structure deflected during stick",
-        "loop_measures",
-        group="friction",
-        larger_term=(
-            "magnitude of the complex ratio of the two first harmonics",
-            lambda values: np.nan_to_num(values.get("harmonic_force_ratio", 0.0)),
-        ),
-        flags="level sine loop",
-    ),
-    MeasureDefinition(
-        "secant_stiffness",
-        "N m-1",
-        1.0,
-        "friction force at the largest slide of a cycle minus friction force at the smallest slide, divided by the "
-        "range of the slide; if the force jumps at the largest or the smallest slide, the mean of the forces "
-        "before and after the jump is used; a cycle whose largest or smallest slide lies at its end is left out; null if "
-        "rigid friction sticks there, where the force takes many values",
-        "loop_measures",
-        group="friction",
-        order=CUBIC_CONVERGENCE_ORDER,
-        flags="level sine",
-    ),
-    MeasureDefinition(
-        "equivalent_damping",
-        "1",
-        1e-8,
-        "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "
-        "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A = (half the range of the slide in a "
-        "cycle)/(value of the key `slide` of this mode); the frequency is that without contact and bonded spring; "
-        "null if other modes contribute more than 5 % of the slide",
-        "loop_measures",
-        group="friction",
-        order=CUBIC_CONVERGENCE_ORDER,
-        flags="level sine loop",
-    ),
-    MeasureDefinition(
-        "friction_work",
-        "J",
-        1e-10,
-        "work done on all interfaces together over the whole run; with method `harmonic`, "
-        "over two cycles",
-        "final_energies",
-        group="energy",
-        flags="run",
-        friction_scale=lambda scale: scale.work,
-    ),
-    MeasureDefinition(
-        "energy_stored",
-        "J",
-        1e-10,
-        "energy stored in the interface at the end of a run on a bench: elastic energy and, with "
-        "grooves, the energy that the load has taken up",
-        group="energy",
-        friction_scale=lambda scale: scale.limit * scale.bond_length,
-    ),
-    MeasureDefinition(
-        "energy_dissipated",
-        "J",
-        1e-10,
-        "energy dissipated by friction in all interfaces over the whole run; with "
-        "method `harmonic`, over two cycles",
-        "final_energies",
-        group="energy",
-        flags="run",
-        friction_scale=lambda scale: scale.work,
-    ),
-    MeasureDefinition(
-        "energy_created",
-        "J",
-        1e-10,
-        "energy created over the whole run by a law that is not passive, such as equation 2.17 as printed in the "
-        "report; with method `harmonic`, over two cycles",
-        "final_energies",
-        group="energy",
-    ),
-    MeasureDefinition(
-        "normal_load_least",
-        "N",
-        1e-6,
-        "smallest normal load in the last cycles",
-        lambda s: s.evaluate_load(np.min),
-        group="friction",
-    ),
-    MeasureDefinition(
-        "normal_load_peak",
-        "N",
-        1e-6,
-        "largest normal load in the last cycles",
-        lambda s: s.evaluate_load(np.max),
-        group="friction",
-    ),
-    MeasureDefinition(
-        "open_fraction",
-        "1",
-        1e-3,
-        "fraction of the time of the last cycles in which the surfaces are not in contact",
-        lambda s: s.evaluate_load(lambda load: np.mean(load <= 0)),
-        4.0,
-        group="friction",
-        larger_term=UNIT_LARGER_TERM,
-    ),
-    MeasureDefinition(
-        STEADY_AMPLITUDE,
-        "m",
-        1e-10,
-        "steady amplitude under a periodic drive, extrapolated if the motion has not settled or may still change by "
-        "more than 0.02 tolerance × amplitude; absent if it has settled and cannot change by more; null if the motion "
-        "has not settled and its limit cannot be extrapolated, or if no common period of load and drive fits into the run",
-        flags="displacement",
-    ),
-    MeasureDefinition(
-        "peak_frequency",
-        "Hz",
-        0.0,
-        "drive frequency, within the swept range, at which the curve of steady amplitudes "
-        "is largest; a resonance unless it is an end of that range",
-    ),
-    MeasureDefinition(
-        "friction_ratio_end",
-        "1",
-        1e-9,
-        "friction force divided by normal load, both at the end of the slide",
-        group="friction",
-        friction_scale=lambda scale: scale.static,
-    ),
-    MeasureDefinition(
-        "friction_ratio_peak",
-        "1",
-        1e-9,
-        "largest value of friction force divided by normal load during the whole run",
-        group="friction",
-        flags="main",
-        friction_scale=lambda scale: scale.static,
-    ),
-    MeasureDefinition(
-        "flutter_amplitude",
-        "m",
-        1e-10,
-        "amplitude (half peak-to-peak at the output) of the unstable limit cycle without a drive, in which friction "
-        "dissipates exactly what a mode of negative damping supplies; smaller motions decay, larger motions grow",
-    ),
-    MeasureDefinition(
-        "work_check",
-        "1",
-        1e-2,
-        "relative difference between two values of the friction work of the run: the value from the trapezoidal rule "
-        "on the samples, and the value in the energy balance",
-        group="energy",
-        flags="error",
-        friction_scale=lambda _: 1.0,
-    ),
-    *_make_random_rows(
-        "relative_displacement_rms",
-        "m",
-        1e-10,
-        "root mean square displacement at the output about its mean, under a random drive",
-    ),
-    *_make_random_rows(
-        "absolute_acceleration_rms",
-        "m s-2",
-        1e-4,
-        "root mean square acceleration at the output, base motion included, under a random drive",
-    ),
-    *_make_random_rows(
-        "response_frequency",
-        "Hz",
-        1e-3,
-        "frequency of the largest peak of the frequency response (H1 estimate) "
-        "under a random drive",
-    ),
-    *_make_random_rows(
-        "response_damping",
-        "1",
-        1e-5,
-        "damping ratio of the largest peak of the frequency response (H1 "
-        "estimate), structure and friction together",
-    ),
-    *_make_random_rows(
-        "friction_power",
-        "W",
-        1e-9,
-        "mean power of friction under a random drive: friction work per second in "
-        "all interfaces together",
-        "energy",
-    ),
-    MeasureDefinition(
-        "onset_level",
-        "m s-2",
-        0.0,
-        "drive level at the onset of slip, found by bisection between two levels; the key `drive.onset` defines what "
-        "counts as the onset; for a force drive the level is in N",
-        group="friction",
-    ),
-    *SINGLE_RUN_ROWS,
-)
-# Values that only set the floors of measures (`larger_term`); results do not contain them.
-INTERNAL_ROWS = (
-    MeasureDefinition(
-        "harmonic_force_ratio",
-        "N m-1",
-        0.0,
-        "magnitude of the complex ratio of the first harmonics of friction force and slide",
-        "loop_measures",
-        flags="sine",
-    ),
-)
-INTERNAL_VALUES = tuple(row.name for row in INTERNAL_ROWS)
-MOTION_TABLE = {row.name: row for row in (*MOTION_MEASURE_ROWS, *INTERNAL_ROWS)}
+
+
+def _read_motion_rows() -> Iterator[MeasureDefinition]:
+    """Yield the rows of the measures of a motion, that of a scatter after its measure."""
+    for name, row in read_measure_rows("motion").items():
+        yield row._replace(function=FUNCTIONS.get(name, row.function))
+        if row.has("scatter"):
+            # The tolerance of a scatter refers to its measure, because the scatter itself may be near 0.
+            yield row._replace(
+                name=f"{name}_scatter", text=SCATTER_TEXT.format(name), larger_term=name
+            )
+
+
+# Rows of all measures of a motion
+MOTION_MEASURE_ROWS = (*_read_motion_rows(), *SINGLE_RUN_ROWS)
+# Values that only set the floors of measures (`find_larger_term`); results do not contain them.
+INTERNAL_VALUES = tuple(read_measure_rows("internal"))
+MOTION_TABLE = {row.name: row for row in MOTION_MEASURE_ROWS} | read_measure_rows("internal")
 
 
 def select_names(flag: str) -> tuple[str, ...]:
@@ -666,10 +316,12 @@ def find_larger_term(name: str, values: Values):
     float or (n,)
         Size of the terms; 0 if the measure is not a difference.
     """
-    row = find_definition(name)
-    if row.larger_term is None:
-        return 0.0
-    return row.larger_term[1](_find_own_values(name, values))
+    term = find_definition(name).larger_term
+    own = _find_own_values(name, values)
+    first = remove_interface_number(name)
+    if first in LARGER_TERM_FUNCTIONS:
+        return LARGER_TERM_FUNCTIONS[first](own)
+    return LARGER_TERMS.get(term, np.abs(own.get(term, 0.0)))
 
 
 def find_subtracted_terms(name: str, values: Values):

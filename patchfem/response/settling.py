@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Outcome
+from ..core import Outcome, max_abs
 
 MOTION_CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY_CLASS = 1  # Index of Outcome.STEADY in MOTION_CLASSES.
@@ -455,9 +455,7 @@ def find_slip_period(time, rate) -> float:
         Times [s] and rates of the relative displacement [m/s].
     """
     rate = np.asarray(rate, float)
-    direction = np.sign(rate) * (
-        np.abs(rate) > MAX_STUCK_SPEED_RATIO * np.abs(rate).max(initial=0.0)
-    )
+    direction = np.sign(rate) * (np.abs(rate) > MAX_STUCK_SPEED_RATIO * max_abs(rate))
     time = np.asarray(time, float)
     start_steps = np.flatnonzero((direction[1:] != 0) & (direction[1:] != direction[:-1]))
     # slip starts at the last sample of the preceding stick interval

@@ -7,6 +7,7 @@ instrument indicates. An instrument evaluates the computed motion and does not c
 
 import numpy as np
 
+from ..core import max_abs
 from .measures import Values
 
 # Smallest first harmonic [m s-2] of an output that counts as moving.
@@ -155,7 +156,7 @@ def read_instrument(
     if kind == "peak":
         return peak
     if kind == "rms":
-        span = window.time[-1] - window.time[0]
+        span = window.span
         return float(np.sqrt(np.trapezoid(window.acceleration**2, window.time) / span))
     if kind == "fundamental":
         return abs(compute_absolute_harmonic(window, drive, 1))
@@ -166,4 +167,4 @@ def read_instrument(
     )
     spectrum = np.zeros(N_FILTER_SAMPLES // 2 + 1, complex)
     spectrum[1 : N_FILTER_HARMONICS + 1] = filtered_harmonics * N_FILTER_SAMPLES / 2
-    return float(np.abs(np.fft.irfft(spectrum, N_FILTER_SAMPLES)).max())
+    return max_abs(np.fft.irfft(spectrum, N_FILTER_SAMPLES))

@@ -18,6 +18,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
+from ..core import max_abs
 from .measures import Measures, Values
 from .welch import CrossDensities, Segments, average_segments, transform_segments
 
@@ -125,7 +126,7 @@ def warn_if_short(measures: Measures, window) -> list[str]:
     if any(name not in measures or not measures[name].value for name in names):
         return []
     frequency, zeta = (measures[name].value for name in names)
-    span = float(window.time[-1] - window.time[0])
+    span = window.span
     decay = 1 / (2 * np.pi * frequency * zeta)
     if span >= MIN_RECORD_DECAY_TIMES * decay:
         return []
@@ -327,7 +328,7 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
     theta : (2,)
         Initial guess.
     """
-    target = np.concatenate([gain.real, gain.imag]) / np.abs(gain).max()
+    target = np.concatenate([gain.real, gain.imag]) / max_abs(gain)
     constants = np.repeat(np.eye(2), f.size, axis=0)
 
     def compute_residual(theta):

@@ -155,7 +155,7 @@ def _find_static(missed: Missed) -> list[Finding]:
     findings = [missed.make_finding(_advise_on_statics(missed, face))]
     if face.model.patch.gap.profile is None:
         return findings
-    if face.patch.points is None or missed.model.kind != "patch":
+    if face.patch.points is None or missed.model.moves:
         element = longest_loaded_cell(face.patch.x, face.patch.active)
         findings += map(Finding, trace_split.advise_split(face.model.patch, element))
     return findings
@@ -174,7 +174,7 @@ def _advise_on_statics(missed: Missed, face: Face) -> Advice:
     # The refinement of the meshes ends when all measures that control it meet the tolerance, or at
     # its limit.
     is_at_limit = missed.excess.keys() <= set(patch_rows.MESH_MEASURES)
-    name = "mesh" if missed.model.kind == "patch" else "mesh of the pressed pieces"
+    name = "mesh of the pressed pieces" if missed.model.moves else "mesh"
     solved = [(patch_model, face.unworn or face.patches)]
     advice = _advise_mesh(missed, solved, name, is_at_limit=is_at_limit)
     return advice._replace(axis="mesh")
@@ -288,7 +288,7 @@ def _advise_steps(missed: Missed) -> Advice | None:
         fixed.append("steps_per_cycle")
     worst = missed.measures[missed.worst]
     is_unresolved = halvings > MAX_FIXED_STEP_HALVINGS or worst.error >= abs(worst.value)
-    if model.kind == "rig" and fixed and is_unresolved:
+    if model.rig is not None and model.friction is not None and fixed and is_unresolved:
         keys = " and ".join(f"accuracy.{key}" for key in fixed)
         return Advice(f"leave out {keys}; the steps then follow from the tolerance", keys)
     return Advice.set_key(

@@ -128,7 +128,7 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
 
     # The bolted modes may belong to another contact than the one of this run: `written` is the one
     # of the measurement, unless the scene states what is subtracted.
-    bolted = model.rig.structure.bolted
+    bolted = model.bolted_joint
     written = bolted.model or model
     with locate_errors(model.source):
         own = _find_stick_stiffness(model, patches)
@@ -152,8 +152,8 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
                 subtracted=joints[n_errors],
                 stuck_stiffness=compute_full_stick_stiffness(model, own_patches[0]),
             )
-            rig = replace(rig, structure=replace(rig.structure, bolted=removed))
-            return FreeRig(replace(model, rig=rig).state_subtracted_joint(), own_patches)
+            free = replace(model, rig=rig).with_bolted(removed)
+            return FreeRig(free.state_subtracted_joint(), own_patches)
 
         # The second result has the joint stiffer by its error, and its change is the error of the
         # motion.

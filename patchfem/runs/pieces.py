@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import max_abs
 from ..elasticity import coating_traction, recovery
 from ..elasticity.elasticity import compute_displacement, von_mises
 from ..formatting import format_length
@@ -320,7 +321,7 @@ def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict[St
         piece = getattr(pieces, side)
         model = getattr(patch_model.pieces, side)
         centres = np.concatenate([piece.points[block].mean(axis=1) for block in piece.blocks])
-        free_height = (1 - HELD_REGION_FRACTION) * np.abs(piece.points[:, 1]).max()
+        free_height = (1 - HELD_REGION_FRACTION) * max_abs(piece.points[:, 1])
         is_free = np.abs(centres[:, 1]) < free_height
         coating = model.coating.material if model.coating else None
 

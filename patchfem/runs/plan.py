@@ -8,26 +8,23 @@ the memory of the run (`list_memory_parts`), and refuses a run that needs more t
 import mmap
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from .. import friction, inputs, structure
-from ..core import Missing, PatchfemError, add_interface_number
+from ..core import Missing, add_interface_number, array_dataclass
 from ..effects import EFFECTS, law_has_trait
 from ..model.model import Model, build
-from ..model.source import locate_errors
+from ..model.source import locate_errors, name_key
 from ..scene import refuse_attribute
 from . import joint, refine
 from .bench import engine as of_bench
+from .interfaces import bond_lists
 from .patch import plan as patch_plan
 from .results.patch_rows import Values
 from .rig import engines
 from .rig import plan as of_rig
-
-if TYPE_CHECKING:
-    from ..model.rig import BoltedJoint
 
 DIMENSIONLESS_GROUPS = {  # definition and SI unit of each group by its name
     "D": (
@@ -57,7 +54,7 @@ DIMENSIONLESS_GROUPS = {  # definition and SI unit of each group by its name
 }
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Plan:
     """Model with the engine that will run it and the numbers of its unknowns.
 
@@ -154,47 +151,49 @@ def plan(source) -> Plan:
 def _make_plan(model: Model) -> Plan:
     """Collect what `plan` states of a Model: its stiffnesses, dimensionless groups, numbers of unknowns and verdict."""
     if model.measured is not None:
-        try:
-            # An invalid table of measured responses is reported before anything runs.
+        # An invalid table of measured responses is reported before anything runs.
+        with name_key("measured.file"):
             inputs.measured.read_table(model.measured.path)
-        except PatchfemError as error:
-            error.key = error.key or "measured.file"
-            raise
-
-    chain = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}
-    groups = {}
-    rig = model.rig
-    motion_sentences = []
 
     # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
+    values: Values = {}
     if model.has_bolted_patch:
-        bolted = rig.structure.bolted
+        before = model.bolted_joint
         model, patches, _ = joint.solve_without_joint(model)
-        motion_sentences += model.describe_removed_joint()
         values = {name: measure.value for name, measure in patches[0].measures.items()}
-        model = _require_joint(model, bolted)
-        rig = model.rig
-    else:
-        motion_sentences += model.describe_removed_joint()
-
-    # Structure of the rig and contact of the patch.
-    patch_sentences = []
-    law_sentences = []
-    if rig is not None:
-        chain = of_rig.structure_stiffnesses(rig) | chain
-        groups |= of_rig.compute_dimensionless_groups(model) if model.kind == "rig" else {}
-        motion_sentences += engines.describe_unused_settings(
-            model, engines.choose_engine(model).name
+    sentences = model.describe_removed_joint()
+    if values:
+        # A run has these modes of the structure alone, but subtracts the joint of its own meshes from the measured ones.
+        model = model.with_bolted(
+            model.bolted_joint._replace(build_rig=before.build_rig, subtracted=before.subtracted)
         )
+    rig = model.rig
+
+    # Links in series, groups and numbers of unknowns: of the structure, the patch, the interfaces and the law.
+    chain = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}
+    groups: Values = {}
+    unknowns: dict[str, int] = {}
+    engine = "static"
+    samples = 0
+    patch_sentences = []
+    if model.patches:
+        unknowns = patch_plan.count_unknowns(model)
+    if rig is not None:
+        engine = engines.choose_engine(model).name
+        chain = of_rig.structure_stiffnesses(rig) | chain
+        groups = of_rig.compute_dimensionless_groups(model) if model.kind == "rig" else {}
+        unknowns |= of_rig.count_unknowns(model)
+        sentences += engines.describe_unused_settings(model, engine)
+    elif model.moves:
+        engine, counts, samples = of_bench.count_bench_sizes(model)
+        unknowns |= counts
+        groups = of_bench.compute_dimensionless_groups(model)
     if model.patch is not None:
         chain |= patch_plan.stiffness_chain(model.patch)
-        if model.has_bolted_patch:
-            chain |= patch_plan.find_solved_links(chain, values)
+        chain |= patch_plan.find_solved_links(chain, values)
         groups |= patch_plan.compute_patch_groups(model)
         patch_sentences += patch_plan.describe_tilt(groups, model.patch)
-
-    interfaces = rig.friction.interfaces if rig is not None else ()
-    for number, interface in enumerate(interfaces):
+    for number, interface in enumerate(() if rig is None else rig.friction.interfaces):
         if interface.patch is not None:
             for name, link in patch_plan.stiffness_chain(interface.patch).items():
                 if link != "rigid":
@@ -205,84 +204,41 @@ def _make_plan(model: Model) -> Plan:
             patch_sentences.append(
                 patch_plan.describe_shear(interface.patch, slip_length, rig.friction.names[number])
             )
+    if model.friction is not None and model.nominal_load > 0:
+        chain |= _find_law_stiffnesses(model)
+    if model.spread_share is not None:
+        # The pad carries this part of the force, and the bonds beyond its edges the rest.
+        groups["share_of_the_spread"] = model.spread_share
 
-    # Numbers of unknowns and samples, from which the memory follows.
-    unknowns = {}
-    if model.patch is not None or model.has_interface_patches:
-        unknowns = patch_plan.count_unknowns(model)
-    engine = "static"
-    samples = 0
+    # What the numbers say of the motion
     if rig is not None:
-        engine = engines.choose_engine(model).name
-        unknowns |= of_rig.count_unknowns(model)
-    if model.kind == "bench":
-        engine, counts, samples = of_bench.count_bench_sizes(model)
-        unknowns |= counts
-        groups = of_bench.compute_dimensionless_groups(model) | groups
-
-    # Laws, and what the numbers of the plan say of the motion.
-    if model.friction is not None:
-        chain |= _interface_stiffnesses(model)
-        groups |= _compute_law_groups(model)
-        law_sentences += _describe_grooves(model)
-    if rig is not None:
-        motion_sentences += of_rig.describe_stick(rig, groups, chain)
-
-    sentences = [*motion_sentences, *patch_sentences, *law_sentences]
+        sentences += of_rig.describe_stick(rig, groups, chain)
+    sentences += [*patch_sentences, *_describe_grooves(model)]
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
     return Plan(model, engine, unknowns, samples, chain, groups, tuple(sentences))
 
 
-def _require_joint(model: Model, before: "BoltedJoint") -> Model:
-    """Return a model with the modes of the structure alone, of which a run subtracts the joint again.
+def _find_law_stiffnesses(model: Model) -> "of_rig.Chain":
+    """Return the stiffnesses [N/m] of the grooves and of the friction laws in stick, by name.
 
-    The comparison run needs the solved patch, and each finer mesh has its own stiffness. `before` is the joint of the
-    model before its patch was solved.
+    The names are "grooves", "bonds" for the law of the first interface, and "bonds_2", ... for the others. A law without
+    a finite stiffness has a text.
     """
-    bolted = model.rig.structure.bolted
-    bolted = bolted._replace(build_rig=before.build_rig, subtracted=before.subtracted)
-    rig = replace(model.rig, structure=replace(model.rig.structure, bolted=bolted))
-    return replace(model, rig=rig)
-
-
-def _interface_stiffnesses(model: Model) -> "of_rig.Chain":
-    """Return the stiffnesses [N/m] of the grooves and of the friction laws in stick, by name; {} without a load.
-
-    The names are "grooves", "bonds" for the law of the first interface, and "bonds_2", ... for the others.
-    """
-    load = model.nominal_load
-    if not load > 0:
-        return {}
+    loads = [(model.friction, model.nominal_load)]
+    if model.rig is not None:
+        for interface in model.rig.friction.interfaces[1:]:
+            loads.append((interface.numbers, bond_lists.find_interface_load(model, interface)))
     stiffnesses = {}
     if model.grooves is not None:
-        stiffnesses["grooves"] = model.grooves.stiffness(load)
-    stiffnesses["bonds"] = _law_stiffness(model.friction, load)
-    others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
-    for number, interface in enumerate(others, 1):
+        stiffnesses["grooves"] = model.grooves.stiffness(model.nominal_load)
+    for number, (law, load) in enumerate(loads):
+        stiffness = "none: it creeps"
+        if not law_has_trait(law.law, "creeps"):
+            stiffness = friction.record.stick_stiffness(law, load)
         name = add_interface_number("bonds", number)
-        own_load = of_rig.find_interface_load(model, interface)
-        stiffnesses[name] = _law_stiffness(interface.numbers, own_load)
+        stiffnesses[name] = "rigid until it slips" if stiffness == inf else stiffness
     return stiffnesses
-
-
-def _law_stiffness(law, load: float):
-    """Return the stiffness [N/m] of a friction law in stick; a text if it is infinite or undefined."""
-    if law_has_trait(law.law, "creeps"):
-        return "none: it creeps"
-    stiffness = friction.record.stick_stiffness(law, load)
-    return "rigid until it slips" if stiffness == inf else stiffness
-
-
-def _compute_law_groups(model: Model) -> Values:
-    """Return {"share_of_the_spread": fraction}, or {} for a law whose bonds do not spread over the surface.
-
-    The fraction [1] of the friction force acts on the pad; the bonds carry the rest beyond its edges.
-    """
-    if model.spread is None:
-        return {}
-
-    return {"share_of_the_spread": friction.bonds.spread.carried_fraction(model.pad, model.spread)}
 
 
 def _describe_grooves(model: Model) -> list[str]:
@@ -352,41 +308,35 @@ def list_memory_parts(plan: Plan) -> list[MemoryPart]:
     points = plan.unknowns.get("interface_points", 0)
     nodes = plan.unknowns.get("elastic_unknowns_about", 0) / 2
 
-    # Pressed are the contact of the scene, and the interfaces of a rig.
-    interfaces = () if model.rig is None else model.rig.friction.interfaces
-    patches = [model.patch, *(interface.patch for interface in interfaces)]
-    patches = [patch for patch in patches if patch is not None]
     remedy = "make contact.element_size larger"
-    if any(patch.mesh.file for patch in patches):
+    if any(patch.mesh.file for patch in model.patches):
         remedy = "give contact.mesh fewer nodes on the interface"
-
-    size = nodes * (BYTES_PER_STATIC_NODE if model.kind == "patch" else BYTES_PER_MOVING_NODE)
+    size = nodes * (BYTES_PER_MOVING_NODE if model.moves else BYTES_PER_STATIC_NODE)
     parts = [
         MemoryPart(refine.PROGRAM_BYTES, "packages and compiled code"),
         MemoryPart(size, f"{points} nodes of the interface", remedy),
     ]
+
     # The histories of a motion count by its stored samples, which the scene may set by the steps.
-    has_steps = model.accuracy.steps_per_cycle is not None
+    steps_key = "accuracy.steps_per_cycle" * (model.accuracy.steps_per_cycle is not None)
     if model.slide is not None:
-        remedy = f"lower {'accuracy.steps_per_cycle' if has_steps else 'slide.cycles'}"
+        remedy = f"lower {steps_key or 'slide.cycles'}"
         if model.slide.kind == "file":
             remedy = "give fewer rows in slide.file"
         size = BYTES_PER_SLIDE_SAMPLE * plan.samples
         parts.append(MemoryPart(size, f"{plan.samples} samples of the slide", remedy))
     elif model.rig is not None:
-        parts += _list_memory_parts_of_motion(plan, has_steps=has_steps)
+        parts += _list_memory_parts_of_motion(plan, steps_key)
     return sorted(parts, reverse=True)
 
 
-def _list_memory_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryPart]:
+def _list_memory_parts_of_motion(plan: Plan, steps_key: str) -> list[MemoryPart]:
     """Return the contributions of the modes, the drive and the stored histories of a rig to its memory.
 
-    `has_steps` tells whether the scene sets the steps per cycle. Lists of bonds are not counted, because their length is
-    limited.
+    `steps_key` is the key with which the scene sets the steps per cycle, or "". Lists of bonds are not counted, because
+    their length is limited.
     """
-    model = plan.model
-    drive = model.rig.drive
-    n_interfaces = len(model.rig.friction.interfaces)
+    drive = plan.model.rig.drive
     n_modes = plan.unknowns["modes"]
     # A drive of segments has breaks too, but no rows of a file.
     n_rows = 0 if drive.signal.segments else len(getattr(drive.signal, "breaks", ()))
@@ -399,26 +349,20 @@ def _list_memory_parts_of_motion(plan: Plan, *, has_steps: bool) -> list[MemoryP
         return parts
 
     # Histories: all samples of the last cycles, and reversals and extremes of the cycles before.
-    settings = engines.choose_numerics(model)
+    settings = engines.choose_numerics(plan.model)
     history = HISTORY_BYTES[plan.engine]
     steps = settings.steps if plan.engine == "march" else HYBRID_SAMPLES_PER_STORED_CYCLE
     samples = max(2, settings.window) * steps
-    width = 2.0 * n_modes + 12 + 6 * n_interfaces
+    width = 2.0 * n_modes + 12 + 6 * len(plan.model.rig.friction.interfaces)
     n_reversals = min(REVERSALS_PER_CYCLE * drive.cycles, structure.drive_sizes.MAX_EARLY_SAMPLES)
     length = "drive.duration" if drive.waveform.is_random else "drive.cycles"
-
+    size = history.sample * width * samples
+    earlier = history.cycle * drive.cycles + history.reversal * width * n_reversals
+    what = f"the histories of {drive.cycles:.3g} cycles"
     return [
         *parts,
-        MemoryPart(
-            history.sample * width * samples,
-            f"{samples} samples of the last cycles",
-            f"lower {'accuracy.steps_per_cycle' if has_steps else length}",
-        ),
-        MemoryPart(
-            history.cycle * drive.cycles + history.reversal * width * n_reversals,
-            f"the histories of {drive.cycles:.3g} cycles",
-            f"lower {length}",
-        ),
+        MemoryPart(size, f"{samples} samples of the last cycles", f"lower {steps_key or length}"),
+        MemoryPart(earlier, what, f"lower {length}"),
     ]
 
 
@@ -435,33 +379,23 @@ def free_bytes(process: Path = Path("/proc"), group: Path = Path("/sys/fs/cgroup
     group : Path
         Folder of the outermost control group.
     """
-    free = 1024 * _read_number(process / "meminfo", "MemAvailable:")
-    used = _read_number(process / "self/statm", place=1) * mmap.PAGESIZE
-    allowed = [_read_allowed(folder) for folder in _list_groups(process, group)]
-    # An unknown number is not finite.
-    known = [total for total in (free, *allowed) if total < inf]
-    return min(known, default=inf) + (used if used < inf else 0.0)
-
-
-def _list_groups(process: Path, group: Path) -> list[Path]:
-    """Return the folders of the control groups that contain the process, and those above them.
-
-    The limit of each of them holds for all that it contains.
-    """
-    folder = group
+    # A line of version 2 is 0::/PATH. The limit of a group holds for all groups in it.
+    inner = group
     with suppress(OSError, ValueError):
         for line in (process / "self/cgroup").read_text("utf-8").splitlines():
-            # A line of version 2 is 0::/PATH.
             if line.startswith("0::/"):
-                folder = group / line.removeprefix("0::/")
-    # The folders above the outermost group have no limits.
-    return [folder, *folder.parents]
+                inner = group / line.removeprefix("0::/")
+    free = [1024 * _read_number(process / "meminfo", "MemAvailable:")]
+    for folder in (inner, *inner.parents):
+        used = _read_number(folder / "memory.current") - _read_number(
+            folder / "memory.stat", "inactive_file"
+        )
+        free.append(_read_number(folder / "memory.max") - used)
 
-
-def _read_allowed(group: Path) -> float:
-    """Return the memory [bytes] that a control group has left, with the cache of files; inf or nan if there is no limit."""
-    cached = _read_number(group / "memory.stat", "inactive_file")
-    return _read_number(group / "memory.max") - _read_number(group / "memory.current") + cached
+    # An unknown number is not finite.
+    known = min((total for total in free if total < inf), default=inf)
+    used = _read_number(process / "self/statm", place=1) * mmap.PAGESIZE
+    return known + (used if used < inf else 0.0)
 
 
 def _read_number(path: Path, name: str = "", place: int = 0) -> float:
@@ -498,10 +432,11 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     total = sum(part.bytes for part in parts)
     free = free_bytes()
     given = plan.model.accuracy.max_memory
-    if total <= min(free, given or refine.DEFAULT_MAX_BYTES):
+    allowed = given or refine.DEFAULT_MAX_BYTES
+    if total <= min(free, allowed):
         return
 
-    limit = f"accuracy.max_memory allows {(given or refine.DEFAULT_MAX_BYTES) / 1e9:.3g} GB"
+    limit = f"accuracy.max_memory allows {allowed / 1e9:.3g} GB"
     other_remedy = ", or raise accuracy.max_memory"
     if total > free:
         limit = f"only {max(free, 0.0) / 1e9:.2g} GB are free"
@@ -515,7 +450,6 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     else:
         size = f"{largest.bytes / 1e9:.3g} GB"
         text += f"; {size} of these are for {largest.what}: {largest.remedy}{other_remedy}"
-
     if total > free or given is not None:
         raise Missing(text, "")
     if say is not None:

@@ -69,13 +69,13 @@ def _describe_factors(plan: Plan, *, has_motion: bool, has_contact: bool) -> lis
     """
     factors = []
     if has_motion:
-        key = "slide.cycles" if plan.kind == "bench" else "drive.cycles"
+        key = "drive.cycles" if plan.model.slide is None else "slide.cycles"
         factors.append(f"twice {key} takes up to twice the time of the motion")
-        if plan.engine == "march" or plan.kind == "bench":
+        if plan.engine == "march" or plan.model.slide is not None:
             factors.append("twice accuracy.steps_per_cycle takes twice the time of the motion")
     if has_contact:
         key = f"half contact.element_size takes about {HALF_ELEMENT_SIZE_TIME_RATIO}"
-        if plan.model.patch is not None and plan.model.patch.area is not None:
+        if plan.model.area is not None:
             key = f"twice contact.area.cells takes about {DOUBLED_CELLS_TIME_RATIO}"
         factors.append(f"{key} times the time of the contact")
     if plan.model.wear is not None:

@@ -192,11 +192,10 @@ class _Passes:
         start = process_time()
         if model.has_interface_patches:
             model = joint.press_interfaces(model)
-        run_plan = replace(self.plan, model=model)
         warnings = list(model.source.remarks)
         notes = list(model.source.notes)
         if model.rig is not None:
-            warnings += engines.describe_unused_settings(model, run_plan.engine)
+            warnings += engines.describe_unused_settings(model, self.plan.engine)
 
         pressed = _press_interfaces(model, self._pressed, estimate=self.estimate)
         if pressed:
@@ -206,7 +205,6 @@ class _Passes:
             # The table [contact] is the only interface then.
             model, patches, stiffer = joint.remove_joint(model, pressed[0].patches)
             pressed = (pressed[0]._replace(model=model, patches=tuple(patches)),)
-            run_plan = replace(run_plan, model=model)
 
         # Sentences on the static contact; those of several interfaces are merged.
         if pressed:
@@ -215,7 +213,7 @@ class _Passes:
             notes += merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
         notes += model.describe_removed_joint()
         inputs = RunInputs(
-            plan=run_plan,
+            plan=replace(self.plan, model=model),
             faces=pressed,
             seconds=seconds,
             warnings=warnings,
@@ -227,11 +225,15 @@ class _Passes:
             stiffer=stiffer,
         )
 
-        if _is_open(inputs.patch) and model.kind != "patch":
+        patch = inputs.patch
+        is_open = patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
+        if is_open and model.moves:
             warnings.append(NO_FRICTION_NO_MOTION_MESSAGE)
             result = patch_result.make_static_result(inputs)
         elif _has_no_load(model):
             result = _make_result_without_load(inputs)
+        elif not model.moves:
+            result = patch_result.make_static_result(inputs)
         else:
             result, pressed = self._move(inputs)
         return mark_unbalanced(result), pressed
@@ -242,43 +244,42 @@ class _Passes:
         Returns the result, and the pressed interfaces with their worn surfaces.
         """
         run_plan = inputs.plan
+        model = run_plan.model
         worn_patch = None
         moved = inputs
-        if run_plan.model.wear is not None and inputs.patch is not None:
+        if model.wear is not None and inputs.patch is not None:
             worn_patch = self._wear_patch(inputs)
             moved = _make_worn_inputs(inputs, worn_patch)
 
         # A long run saves its state, so that it can be resumed.
         try:
             with self._saving_context(run_plan, moved.patch):
-                if run_plan.kind == "patch":
-                    result = patch_result.make_static_result(moved)
-                else:
-                    result = rig.run_motion(moved)
+                result = rig.run_motion(moved)
         except NotConverged as error:
-            if moved.patch is not None and run_plan.kind != "patch":
+            if moved.patch is not None:
                 error.partial_result = _make_result_at_rest(moved, run_plan)
             raise
 
         # Static measures come first, and those of wear last.
-        if run_plan.kind != "patch":
-            result = _add_static_measures(result, moved.faces)
-            if run_plan.model.patch is not None and run_plan.model.patch.area is not None:
-                result = area_motion.add_reversal_measure(result, moved.coarse)
-        if run_plan.model.wear is not None:
-            result = measures.add_wear_measures(
-                replace(result, plan=run_plan), worn_patch, self.estimate
-            )
+        result = _add_static_measures(result, moved.faces)
+        if model.area is not None:
+            result = area_motion.add_reversal_measure(result, moved.coarse)
+        if model.wear is not None:
+            result = replace(result, plan=run_plan)
+            result = measures.add_wear_measures(result, worn_patch, self.estimate)
         return result, moved.faces
 
     def _wear_patch(self, inputs: RunInputs) -> "evolve.WornPatch":
         """Compute the wear of a patch, continuing from a saved state if there is one; without a file no state is saved."""
         model = inputs.plan.model
+        patch, *coarse = inputs.patches[:3]
         file = self.state_file
-        key = file and hash_run(model, inputs.patch, file.version)
-        return evolve.compute_and_save_wear(
-            file, key, model, inputs.patch, inputs.coarse[:2], inputs.progress
-        )
+        if file is None:
+            return evolve.compute_wear(model, patch, coarse, inputs.progress)
+        key = hash_run(model, patch, file.version)
+        initial = evolve.load_wear_state(file.path, key) if file.resume else None
+        store = partial(evolve.save_wear_state, file.path, key)
+        return evolve.compute_wear(model, patch, coarse, inputs.progress, initial, store)
 
     def _saving_context(self, run_plan: Plan, patch):
         """Return a context in which marches save their states; one that does nothing without them.
@@ -289,6 +290,7 @@ class _Passes:
             If the run should continue from a state that does not exist.
         """
         file = self.state_file
+        model = run_plan.model
         if file is None or not is_march(run_plan):
             return nullcontext()
 
@@ -299,7 +301,6 @@ class _Passes:
             """Return the path of the state file of one march."""
             return file.path.parent / f"{stem}_{number}.npz"
 
-        model = run_plan.model
         is_missing = not self._count and model.wear is None and not march_state_path(1).is_file()
         if file.resume and is_missing:
             raise evolve.make_missing_state_error(file.path)
@@ -337,11 +338,6 @@ def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
             static[face.name_measure(name)] = measure
     motion = {name: m for name, m in result.measures.items() if name not in static}
     return replace(result, measures=static | motion)
-
-
-def _is_open(patch) -> bool:
-    """Return whether the two pieces of a solved patch do not touch."""
-    return patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
 
 
 def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list[str]:
@@ -485,6 +481,6 @@ def is_march(run_plan: Plan) -> bool:
 
 def _has_no_load(model: Model) -> bool:
     """Return whether no interface of a model without [contact] carries a load."""
-    if model.rig is not None and len(model.rig.friction.names):
+    if model.rig is not None and model.rig.friction.names:
         return not any(interface.load for interface in model.rig.friction.interfaces)
     return model.point is not None and model.point.load == 0

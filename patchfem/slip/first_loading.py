@@ -1,4 +1,4 @@
-"""Partial slip over the cells of a face: first loading, parallel elements, shear modes, state at a reversal.
+"""Partial slip over the cells of a face: first loading, parallel elements, state at a reversal.
 
 Cells yield at fixed tractions. Slip zones only grow within a stroke, so each displacement of the first loading is one
 bounded problem from rest, and Masing's rule gives the other strokes.
@@ -12,7 +12,6 @@ import numpy as np
 from ..contact.bounded import BoundedProblem, BoundedSolution, solve_bounded
 from ..contact.cells import CellCompliance
 from ..core import NotConverged, PatchfemError, frozen_array
-from . import shear_modes
 
 OPEN = 0  # State of a cell without contact
 STICK = 1  # State of a cell in contact below its friction limit
@@ -26,10 +25,6 @@ N_SLIDERS = 256  # Number of yield displacements of the parallel elements
 SLIP_RESIDUAL_TOL = 1e-7
 # Smallest stiffness of an element relative to their sum; smaller ones are rounding errors of the slope of a curve
 MIN_STIFFNESS_RATIO = 1e-12
-N_CELL_MODES = 12  # Number of shear modes with which a face starts
-MAX_CELL_MODES = 64  # Largest number of modes that the tolerance asks for
-# Ratio of the modes that are computed to those that are kept; the others show the error of leaving modes out
-COMPUTED_MODES_RATIO = 2
 
 
 class FirstLoading(NamedTuple):
@@ -301,80 +296,3 @@ def find_reversal(compliance: CellCompliance, limit: np.ndarray, amplitude: floa
     slip = slips * np.maximum(-solution.slope, 0.0)
     status = np.where(is_closed, STICK, OPEN) + slips
     return ReversalState(status.ravel().astype(np.int8), 4 * slip.ravel())
-
-
-def find_cell_modes(compliance: CellCompliance, limit: np.ndarray, n_modes: int):
-    """Find the most compliant modes of D^1/2 C D^1/2, with D the friction limits of the cells in contact.
-
-    Parameters
-    ----------
-    compliance : CellCompliance
-        Shear compliance C of the cells.
-    limit : (m,) ndarray
-        Friction limit [N] of each cell; 0 without contact.
-    n_modes : int
-        Number of modes; fewer are found if the pieces are rigid or fewer cells are in contact.
-
-    Returns
-    -------
-    ShearModes
-        Its points are indices into the flattened cells.
-    """
-    from scipy.sparse.linalg import LinearOperator, eigsh
-
-    n_modes = 1 if compliance.is_rigid else n_modes
-    points = np.flatnonzero(limit > 0)
-    root = np.sqrt(limit[points])
-    force = np.zeros(limit.size)
-
-    def apply(vector: np.ndarray) -> np.ndarray:
-        """Return D^1/2 C D^1/2 times a vector of the cells in contact."""
-        force[points] = root * vector.ravel()
-        return root * (compliance @ force)[points]
-
-    # The method of Lanczos needs more cells than modes; a few cells give the whole matrix
-    if points.size <= 2 * n_modes + 1:
-        matrix = np.array([apply(column) for column in np.eye(points.size)])
-        eigenvalues, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
-    else:
-        operator = LinearOperator((points.size, points.size), apply, dtype=float)
-        eigenvalues, vectors = eigsh(operator, n_modes, which="LA", v0=root)
-    order = np.argsort(eigenvalues)[::-1][:n_modes]
-    return shear_modes.ShearModes(
-        frozen_array(points, np.int64),
-        frozen_array(limit[points]),
-        frozen_array(vectors[:, order] / root[:, None]),
-        frozen_array(1 / eigenvalues[order]),
-    )
-
-
-def find_sufficient_cell_modes(
-    compliance: CellCompliance, limit: np.ndarray, bond_length: float, tolerance: float
-):
-    """Find as many of the most compliant modes as the friction force of a face needs to meet a tolerance.
-
-    Twice as many modes are computed as are kept, and the others show the error of the force
-    (`shear_modes.estimate_force_errors`).
-
-    Parameters
-    ----------
-    compliance : CellCompliance
-        Shear compliance of the cells.
-    limit : (m,) ndarray
-        Friction limit [N] of each cell.
-    bond_length : float
-        Displacement [m] over which a cell reaches its limit.
-    tolerance : float
-        Largest error of the friction force on first loading / friction limit.
-
-    Returns
-    -------
-    ShearModes
-    """
-    count = N_CELL_MODES
-    while True:
-        modes = find_cell_modes(compliance, limit, COMPUTED_MODES_RATIO * count)
-        is_last = 2 * count > MAX_CELL_MODES or modes.stiffness.size < COMPUTED_MODES_RATIO * count
-        if is_last or shear_modes.estimate_force_errors(modes, bond_length)[count] <= tolerance:
-            return modes.select(count)
-        count *= 2

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..contact import cells
 from ..contact.unilateral import INDEFINITE_COMPLIANCE_MESSAGE
 from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, use_one_blas_thread
@@ -304,21 +305,24 @@ def _find_order_by_elimination(compliance: np.ndarray, force: np.ndarray) -> np.
 
 
 def shear_modes(
-    tangential: np.ndarray,
+    compliance: "np.ndarray | cells.CellCompliance",
     friction_limit: np.ndarray,
     count: int,
     steepest_fall: float = 0.0,
 ) -> ShearModes:
-    """Return the `count` most compliant modes of D^1/2 C D^1/2 for nodes with bonds.
+    """Return the `count` most compliant modes of D^1/2 C D^1/2 for nodes or cells with bonds.
+
+    A contact is stable if the stiffness of the pieces and the holder in shear exceeds the steepest fall of the friction
+    forces.
 
     Parameters
     ----------
-    tangential : (m, m) ndarray
-        Compliance C [m/N].
+    compliance : (m, m) ndarray or CellCompliance
+        Compliance C [m/N] of m nodes, or of the cells of a face.
     friction_limit : (m,) ndarray
-        Friction limits D [N].
+        Friction limits D [N], 0 outside the contact.
     count : int
-        Number of modes.
+        Number of modes; fewer are found if fewer nodes are in contact or the pieces are rigid.
     steepest_fall : float
         Steepest fall of the friction force of a node over its slip, relative to its friction limit [1/m].
 
@@ -327,46 +331,55 @@ def shear_modes(
     PatchfemError
         If a weakening contact could jump without a change of the displacement: steepest_fall lambda_max(D C) >= 1.
     """
-    return _compute_all_modes(tangential, friction_limit, steepest_fall).select(count)
-
-
-def _compute_all_modes(tangential, friction_limit, steepest_fall: float) -> ShearModes:
-    """Return all modes of the nodes that carry load.
-
-    `shear_modes` selects from them. A contact is stable if the stiffness of the pieces and the holder in shear exceeds
-    the steepest fall of the friction forces.
-
-    Parameters
-    ----------
-    tangential : (m, m) ndarray
-        Shear compliance [m/N] of the interface nodes.
-    friction_limit : (m,) ndarray
-        Friction limits [N], 0 outside the contact.
-    steepest_fall : float
-        Steepest fall of the friction force of a node over its slip, relative to its friction limit [1/m].
-
-    Raises
-    ------
-    PatchfemError
-        If the contact could slip suddenly.
-    """
     points = frozen_array(np.flatnonzero(friction_limit > 0), np.int64)
     friction_limit = friction_limit[points]
-    # Rigid pieces in series with one spring have only one mode: D^1/2 C D^1/2 has the eigenvector D^1/2.
-    if np.ptp(tangential) == 0:
-        total = friction_limit.sum()
-        shape = np.full((points.size, 1), total**-0.5)
-        compliance = tangential[:1, 0] * total
-    else:
-        root = np.sqrt(friction_limit)[:, None]
-        with use_one_blas_thread():
-            values, vectors = np.linalg.eigh(root * tangential[np.ix_(points, points)] * root.T)
-        shape = vectors[:, ::-1] / root
-        compliance = values[::-1]
+    root = np.sqrt(friction_limit)
+    solve = _solve_matrix if isinstance(compliance, np.ndarray) else _solve_operator
+    values, vectors = solve(compliance, points, root, count)
+    shape = vectors[:, ::-1] / root[:, None]
+    modes = ShearModes(points, friction_limit, shape, 1 / values[::-1]).select(count)
 
-    modes = ShearModes(points, friction_limit, shape, 1 / compliance)
-    require_stability(modes, steepest_fall)
+    stability = steepest_fall / modes.stiffness[0]
+    if stability >= 1:
+        raise PatchfemError(
+            "friction.kinetic below static: the patch may slip suddenly without a change of the force on it, because the "
+            f"friction force falls over the slip {stability:.3g} times as steeply as the pieces and the holder relax (the "
+            "limit is 1); raise friction.bond_length or friction.kinetic, or make the holder stiffer"
+        )
     return modes
+
+
+def _solve_matrix(compliance: np.ndarray, points, root, _) -> tuple[np.ndarray, np.ndarray]:
+    """Return all eigenvalues (r,), increasing, and eigenvectors (a, r) of D^1/2 C D^1/2 at points (a,); root is D^1/2."""
+    # Rigid pieces in series with one spring have only one mode: D^1/2 C D^1/2 has the eigenvector D^1/2.
+    if np.ptp(compliance) == 0:
+        total = root @ root
+        return compliance[:1, 0] * total, root[:, None] / np.sqrt(total)
+    with use_one_blas_thread():
+        return np.linalg.eigh(root[:, None] * compliance[np.ix_(points, points)] * root)
+
+
+def _solve_operator(compliance, points, root, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the `count` largest eigenvalues, increasing, and eigenvectors as `_solve_matrix` does, for a CellCompliance."""
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    count = 1 if compliance.is_rigid else count
+    force = np.zeros(compliance.waves.size)
+
+    def apply(vector: np.ndarray) -> np.ndarray:
+        """Return D^1/2 C D^1/2 times a vector of the cells in contact."""
+        force[points] = root * vector.ravel()
+        return root * (compliance @ force)[points]
+
+    # The method of Lanczos needs more cells than modes; a few cells give the whole matrix
+    if points.size <= 2 * count + 1:
+        matrix = np.array([apply(column) for column in np.eye(points.size)])
+        values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
+        return values[-count:], vectors[:, -count:]
+    operator = LinearOperator((points.size, points.size), apply, dtype=float)
+    values, vectors = eigsh(operator, count, which="LA", v0=root)
+    order = np.argsort(values)
+    return values[order], vectors[:, order]
 
 
 class SharedModes(NamedTuple):
@@ -401,25 +414,6 @@ def share_rest(modes: ShearModes, diagonal: np.ndarray) -> SharedModes:
     modes = modes.select(max(int(is_softer.sum()), 1))
     values = values[: modes.stiffness.size]
     return SharedModes(replace(modes, stiffness=1 / (values - rest)), rest / modes.limit)
-
-
-def require_stability(modes: ShearModes, steepest_fall: float) -> None:
-    """Raise PatchfemError if a weakening contact could slip suddenly.
-
-    Parameters
-    ----------
-    modes : ShearModes
-        The most compliant mode comes first.
-    steepest_fall : float
-        Steepest fall of the friction force of a node over its slip, relative to its friction limit [1/m].
-    """
-    stability = steepest_fall / modes.stiffness[0]
-    if stability >= 1:
-        raise PatchfemError(
-            "friction.kinetic below static: the patch may slip suddenly without a change of the force on it, because the "
-            f"friction force falls over the slip {stability:.3g} times as steeply as the pieces and the holder relax (the "
-            "limit is 1); raise friction.bond_length or friction.kinetic, or make the holder stiffer"
-        )
 
 
 def estimate_force_errors(modes: ShearModes, bond_length: float) -> np.ndarray:
@@ -458,7 +452,7 @@ def estimate_force_errors(modes: ShearModes, bond_length: float) -> np.ndarray:
 
 
 def find_sufficient_modes(
-    tangential: np.ndarray,
+    compliance: "np.ndarray | cells.CellCompliance",
     friction_limit: np.ndarray,
     bond_length: float,
     count: int,
@@ -474,7 +468,7 @@ def find_sufficient_modes(
 
     Parameters
     ----------
-    tangential : (m, m) ndarray
+    compliance : (m, m) ndarray or CellCompliance
         Compliance C [m/N].
     friction_limit : (m,) ndarray
         Friction limits D [N]; the bonds of a node have the stiffness friction_limit/bond_length.
@@ -491,11 +485,16 @@ def find_sufficient_modes(
     -------
     ShearModes
     """
-    modes = _compute_all_modes(tangential, friction_limit, steepest_fall)
-    errors = estimate_force_errors(modes, bond_length)
-    while count < min(max_modes, modes.stiffness.size) and errors[count] > tolerance:
-        count = min(2 * count, max_modes)
-    return modes.select(count)
+    # All modes of a matrix are computed at once, and twice as many of cells as are kept; the others show the error
+    n_computed = friction_limit.size if isinstance(compliance, np.ndarray) else 2 * count
+    while True:
+        modes = shear_modes(compliance, friction_limit, n_computed, steepest_fall)
+        errors = estimate_force_errors(modes, bond_length)
+        while count < min(max_modes, modes.stiffness.size) and errors[count] > tolerance:
+            count = min(2 * count, max_modes)
+        if 2 * count <= n_computed:
+            return modes.select(count)
+        n_computed = 2 * count
 
 
 def comparison_mode_count(count: int) -> int:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import InitialState, ModalBasis, SineDrive
+from ..core import InitialState, ModalBasis, SineDrive, max_abs
 from ..scene.keys.tables import Drive
 
 # Number of equally spaced samples per cycle of a fully recorded release; they resolve 100 harmonics
@@ -123,9 +123,7 @@ def estimate_peak_speed(drive, start: InitialState | None = None) -> float:
     speed = find_max_acceleration(drive) / omega
     if start is None:
         return speed
-    start_speed = np.maximum(
-        np.abs(start.v).max(initial=0.0), omega * np.abs(start.z).max(initial=0.0)
-    )
+    start_speed = np.maximum(max_abs(start.v), omega * max_abs(start.z))
     return np.maximum(speed, start_speed)
 
 

@@ -18,12 +18,11 @@ without segments also has:
 `DRIVE_BUILDERS` maps each waveform to the function that builds its drive from `DriveKeys`.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..core import DriveSegment, ModalBasis
+from ..core import DriveSegment, ModalBasis, array_dataclass, max_abs
 from .drive_sizes import DriveKeys, count_cycles_per_level
 
 
@@ -43,7 +42,7 @@ class DriveSignal(Protocol):
         """Return the drive signal [m s-2] at times t (k,) [s]."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class PiecewiseDrive:
     """Drive signal that consists of successive constant and sinusoidal segments.
 
@@ -128,7 +127,7 @@ def make_levels(
     return PiecewiseDrive(tuple(segments), period, moving)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class SweepDrive:
     """Sinusoidal drive signal whose frequency is swept between two values and then stays constant.
 
@@ -213,7 +212,7 @@ class LineLoss(NamedTuple):
     fraction: float
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class RecordedDrive:
     """Recorded drive signal, interpolated linearly between its rows and zero after the last row.
 
@@ -241,7 +240,7 @@ class RecordedDrive:
     @property
     def max_acceleration(self) -> float:
         """Largest acceleration [m s-2]."""
-        return float(np.abs(self.value).max())
+        return max_abs(self.value)
 
     @property
     def duration(self) -> float:

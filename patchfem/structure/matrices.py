@@ -11,7 +11,7 @@ the modes stay coupled by D.
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
-from ..core import ModalBasis, PatchfemError
+from ..core import ModalBasis, PatchfemError, max_abs
 from ..inputs.symmetric import read_row, symmetrize
 from .modes import make_basis
 
@@ -198,7 +198,7 @@ def _compute_modes(root, K) -> tuple[np.ndarray, np.ndarray]:
     """
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
-    min_square = len(K) * EIGENVALUE_TOL * np.abs(squares).max(initial=0.0)
+    min_square = len(K) * EIGENVALUE_TOL * max_abs(squares)
     if squares[0] < -min_square:
         raise PatchfemError(
             "K is not positive semidefinite: for one motion the stiffness divided by the "

@@ -7,11 +7,9 @@ of a shaker do). Linear interpolation between rows h apart multiplies a line at 
 compensated.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ..core import PatchfemError
+from ..core import PatchfemError, array_dataclass
 from .drive_sizes import DriveKeys
 from .drives import RecordedDrive
 
@@ -22,7 +20,7 @@ MIN_SPECTRAL_LINES = 8
 SPECTRAL_LINE_TOL = 1e-9
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class RandomRecord(RecordedDrive):
     """Sampled record of a stationary random drive signal.
 

@@ -1,11 +1,11 @@
 """Measured modes at nodes of a rig, with directions such as "12:+x" or "12:+x, 13:-x"."""
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
-from ..core import ModalBasis, PatchfemError
+from ..core import ModalBasis, PatchfemError, array_dataclass
 from ..inputs.damage import list_some
 from ..inputs.universal import DIRECTION_NAMES
 from .modes import make_basis
@@ -23,7 +23,7 @@ MIN_REPRESENTED_MASS_FRACTION = 0.8
 Motions = dict[tuple[int, int], np.ndarray]  # motions (n,) of the modes by (node, axis 0 to 5)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class MeasuredModes:
     """Natural modes from a measurement, with their shapes at nodes and directions.
 

@@ -5,17 +5,16 @@ sinc^2(f h), which is compensated. It adds images at n/h +- f of the relative si
 lower frequency responds to them by (f h)^4, which is 6e-8 at `TONE_ROWS_PER_PERIOD` rows per period.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from ..core import array_dataclass
 from .drive_sizes import DriveKeys, count_beat_cycles
 from .drives import RecordedDrive
 
 TONE_ROWS_PER_PERIOD = 64  # number of rows of the record per period of the highest tone
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class TonesRecord(RecordedDrive):
     """Record of a sum of tones, whose cycle is that of the first tone.
 

@@ -1,10 +1,10 @@
 """Areal scan of heights on a rectangular raster, and its levelling."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array
+from ..core import PatchfemError, array_dataclass, frozen_array
 from .profile import Profile, robust_deviation
 
 SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard deviations
@@ -15,7 +15,7 @@ SPIKE_WINDOW_SIDE = 5  # side of the square of the median
 COLLINEAR_POINTS_TOL = 1e-6
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Areal:
     """Areal scan of a surface.
 

@@ -1,10 +1,10 @@
 """Measured or simulated trace of heights, and its levelling, resampling and cleaning."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array
+from ..core import PatchfemError, array_dataclass, frozen_array
 from ..formatting import format_length
 
 # Number of samples in the running median; groups of up to three samples can be spikes
@@ -25,7 +25,7 @@ MAX_TRACE_SAMPLES = 2_097_152
 EVEN_STEPS_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trace
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Profile:
     """Trace of a surface, which is straight between its samples.
 

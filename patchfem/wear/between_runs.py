@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import PatchfemError
+from ..core import PatchfemError, max_abs
 from ..formatting import format_length
-from ..model.earlier_wear import GAP_DIFFERENCE_FRACTION, LOADING_KEYS
+from ..model.wear import GAP_DIFFERENCE_FRACTION, LOADING_KEYS
 from ..surface.quantity import Quantity
 
 # Width of the worn part divided by that of its floor, the deepest fifth
@@ -134,7 +134,7 @@ def _require_same_patch(first: PatchState, second: PatchState) -> None:
 
     # tables may name files that changed, so the unworn gaps are compared too
     unworn = [_move_to(second, state, state.gap - state.depth) for state in (first, second)]
-    difference = float(np.abs(unworn[0] - unworn[1]).max())
+    difference = max_abs(unworn[0] - unworn[1])
     if difference > GAP_DIFFERENCE_FRACTION * float(np.ptp(unworn[1])) + MIN_HEIGHT_RANGE:
         raise PatchfemError(
             f"{both}: their unworn surfaces differ by {format_length(difference, 3)}"
@@ -179,7 +179,7 @@ def _interpolation_error(state: PatchState, x) -> float:
         return 0.0
     nodes = np.unique([*range(0, state.x.size, 2), state.x.size - 1])
     coarse = _interpolate(state.x, state.x[nodes], state.depth[..., nodes])
-    return float(np.abs(state.depth - coarse).max()) / 4
+    return max_abs(state.depth - coarse) / 4
 
 
 def _enclose(value: float, error: float | None, unit: str) -> Quantity:

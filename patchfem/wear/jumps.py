@@ -1,10 +1,11 @@
 """Jumps over many cycles of wear, either of equal length or as long as the tolerance allows."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from ..core import array_dataclass, max_abs
 from .depth import Press, solve_jump, wear_rates
 
 MAX_JUMP_GROWTH = 4.0  # largest ratio of the length of a jump to that of the previous jump
@@ -25,7 +26,7 @@ MIN_WORN_DEPTH = 1e-300
 SHAKEDOWN_WEAR_RATIO = 1e-3
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class WearProblem:
     """Contact problem, slip path and wear law of two pieces.
 
@@ -43,7 +44,7 @@ class WearProblem:
     cycles: float
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class WearState:
     """State of a wear computation after a number of cycles.
 
@@ -73,7 +74,7 @@ class WearState:
 
         It is the change of the depth when all jumps are halved, plus `path_error`.
         """
-        return float(np.abs(self.depth - self.coarse_depth).max()) + self.path_error
+        return max_abs(self.depth - self.coarse_depth) + self.path_error
 
 
 def make_initial_wear_state(problem: WearProblem, depth=None) -> WearState:
@@ -202,7 +203,7 @@ def _correct_path(
     # Let h be the length of this jump, k that of the previous jump, and f the path as a function of the cycles. The
     # truncation error of the mean of both ends is h^3/12 f'', and that of the trend is -(h/6 + k/4) h^2 f''. So the
     # error of the mean is 1/(3 + 3 k/h) of the difference of both, which is at most a third.
-    path_error = float(np.abs(repeated.depth - after.depth).max()) / 3
+    path_error = max_abs(repeated.depth - after.depth) / 3
     worn = float((repeated.depth - state.depth).max())
     scale = max(worn, SHAKEDOWN_WEAR_RATIO * float(repeated.depth.max()))
     corrected = replace(
@@ -250,7 +251,7 @@ def _take_halves(
 
     # Richardson's estimate of the error of the halves, relative to the tolerance
     depth_limit = tolerance * max(float(depth.max()), MIN_WORN_DEPTH)
-    depth_error = float(np.abs(depth - coarse).max()) / RICHARDSON_DIVISOR / depth_limit
+    depth_error = max_abs(depth - coarse) / RICHARDSON_DIVISOR / depth_limit
     load = float(force.sum())
     if load <= 0:
         return after, depth_error

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import PatchfemError
+from ..core import PatchfemError, max_abs
 from ..formatting import format_length
 from ..surface.quantity import CONFIDENCE_LEVEL, HALF_WIDTH_95, Quantity
 
@@ -347,7 +347,7 @@ def _refine(bins: Bins, history: WearHistory, start: Place, *, is_fixed: bool = 
     """
     from scipy.optimize import least_squares
 
-    scale = float(np.abs(bins.depth).max())
+    scale = max_abs(bins.depth)
 
     def move(values) -> Place:
         """Return the place at a relative coefficient, and a shift in bins."""

@@ -17,7 +17,7 @@ from patchfem.hybrid.cases import EXACT_RTOL
 from patchfem.hybrid.laws import masing
 from patchfem.model import build
 from patchfem.runs import choose_numerics, solve_with_coarser
-from patchfem.runs.rig.joints import list_joints
+from patchfem.runs.interfaces.joints import list_joints
 from patchfem.scene import scene
 from patchfem.structure import make_release
 from patchfem.time_steps import contacts, laws, time_march

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.mesh import Layout, TensorGrid, divide_into_columns, divide_into_rows
+from patchfem.mesh import Layout, RowHeights, TensorGrid, divide_into_columns, divide_into_rows
 from patchfem.model import build
 from patchfem.model.patch import PatchModel
 from patchfem.runs.patch.condensed import CondensedPair, condense
@@ -55,14 +55,12 @@ def pair(halvings: int = 2) -> CondensedPair:
     """Return the condensed pieces on the coarsest mesh (110 columns), whose cells are halved `halvings` times."""
     asked = case(0.0)
     half = asked.pieces.length / 2
-    x = divide_into_columns(
-        Layout(-half, half, ((-half, -half, 1.2e-6),), (-half, half), half / 30, half / 30, 0.06)
-    )
+    x = divide_into_columns(Layout(-half, half, ((-half, -half, 1.2e-6),), half / 30, 0.06))
     height = asked.pieces.height
-    rows = Layout(
-        0.0, height, ((0.0, 0.0, x[1] - x[0]),), (0.0, height), height / 3, height / 3, 0.25
+    rows = RowHeights(
+        first=x[1] - x[0], last=height / 3, coating=height / 3, largest=height / 3, growth=0.25
     )
-    grid = TensorGrid(x, *divide_into_rows(rows, asked.pieces.lower.thickness))
+    grid = TensorGrid(x, *divide_into_rows(height, asked.pieces.lower.thickness, rows))
     for _ in range(halvings):
         grid = grid.refine()
     return condense(asked, grid)

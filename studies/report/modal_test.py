@@ -16,7 +16,7 @@ import patchfem as pf
 from patchfem.hybrid import runs
 from patchfem.hybrid.cases import EXACT_RTOL, Schedule, make_rig_case
 from patchfem.runs import choose_numerics, solve_with_coarser
-from patchfem.runs.rig.contact_points import make_contact
+from patchfem.runs.interfaces.contact_points import make_contact
 from patchfem.runs.rig.joints import make_joints
 from patchfem.structure.drives import RecordedDrive
 from patchfem.time_steps.time_march import march

@@ -26,8 +26,8 @@ import patchfem as pf
 from patchfem.commands.sources import read_sources
 from patchfem.effects import EFFECTS, LAWS
 from patchfem.formatting import format_value
-from patchfem.response.rows import MOTION_MEASURE_ROWS as MOTION
-from patchfem.runs.results.patch_rows import PATCH_MEASURE_ROWS as STATIC
+from patchfem.response.rows import MOTION_MEASURE_ROWS
+from patchfem.runs.results.patch_rows import PATCH_TABLE
 from patchfem.scene.keys.types import list_keys
 
 ROOT = Path(__file__).parents[2]
@@ -360,7 +360,7 @@ def source(name: str) -> list:
 def glossary() -> str:
     """Return every term and every measure in one alphabetical list."""
     words = glossary_terms()
-    for row in (*STATIC, *MOTION):
+    for row in (*PATCH_TABLE.values(), *MOTION_MEASURE_ROWS):
         text = f"{row.text[:1].upper()}{row.text[1:]} [{row.unit}]. A measure: `{row.name}` in `summary.json`."
         words.setdefault(row.name.replace("_", " "), text)
     body = "\n\n".join(

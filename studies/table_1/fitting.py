@@ -27,8 +27,7 @@ from patchfem.campaigns.held_out import select_held_out
 from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N
-from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, Descent, descend
-from patchfem.identify.space import UnitCubeResidual, make_search_space
+from patchfem.identify.descent import Descent, UnitCubeResidual, descend, make_search_space
 
 MIL = 25.4e-6
 SCORES = FOLDER / "scores.json"
@@ -41,6 +40,8 @@ TIED_FACTOR = (
 )
 # rms difference of the training logarithms above which two fits are different optima
 VALLEY_DISTANCE = 0.01
+# Largest distance from a bound at which a parameter counts as on the bound, relative to its range
+NEAR_BOUND_FRACTION = 1e-3
 DRAWS = 4000  # number of bootstrap draws of rows
 PERCENT = (5, 95)  # percentiles of the bootstrap intervals
 # start values of parameters that a smaller model does not have
@@ -80,7 +81,7 @@ def run_descents(model: UnitCubeResidual, points, before_descent) -> list[Descen
     ends = []
     for point in points:
         before_descent()
-        ends.append(descend(model, point, range(len(point))))
+        ends.append(descend(model, point))
     return ends
 
 

@@ -32,7 +32,7 @@ from patchfem.response import make_onset_test
 from patchfem.runs import choose_numerics
 from patchfem.runs import run as runner
 from patchfem.runs.patch.press import solve_patch_contact
-from patchfem.runs.rig import evaluation, rig
+from patchfem.runs.rig import levels, rig
 from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent
@@ -83,7 +83,7 @@ def onset(worn, cycles: int, pair=None) -> float:
     model = build(scene.loads(text, SCENE))
     patch = solve_patch_contact(model.patch, pair, worn)
     run = rig.solve_rig(model, choose_numerics(model), patch)
-    return evaluation.find_onset(run.levels, run.run_level, 3e-3, make_onset_test("slip"))[0] / G_N
+    return levels.find_onset(run.levels, 3e-3, make_onset_test("slip"))[0] / G_N
 
 
 def _worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:

@@ -17,11 +17,11 @@ from patchfem.elasticity import BlockShape, Layers, make_stack, sides
 from patchfem.slip.first_loading import (
     SLIP,
     STICK,
-    find_cell_modes,
     find_reversal,
     make_cell_elements,
     slip_from_rest,
 )
+from patchfem.slip.shear_modes import shear_modes
 
 LENGTH, HEIGHT, LOAD = 12.7e-3, 6.35e-3, 115.6538
 TITANIUM = (121e9, 0.32)
@@ -333,7 +333,7 @@ def test_exact_states_at_a_reversal():
 def test_exact_shear_modes_diagonalise_the_compliance(n_modes=6):
     """Shapes are orthonormal with the limits, and stiffness times compliance reproduces them."""
     shear, limit = get_slipping_cells()
-    modes = find_cell_modes(shear, limit.ravel() * shear.cell_area, n_modes)
+    modes = shear_modes(shear, limit.ravel() * shear.cell_area, n_modes)
     weighted = modes.limit[:, None] * modes.shape
     assert modes.shape.T @ weighted == pytest.approx(np.eye(n_modes), abs=1e-9)
     for shape, force, stiffness in zip(modes.shape.T, weighted.T, modes.stiffness):
@@ -353,7 +353,7 @@ def test_exact_rigid_cells_on_a_spring_share_its_force():
     forces = elements.force_matrix @ (elements.yield_displacement / 2)
     assert forces == pytest.approx(elements.limit / 2)
     assert compute_contact_stiffness(rigid, limit > 0) == pytest.approx(1e8)
-    assert find_cell_modes(rigid, limit.ravel(), 4).stiffness.size == 1
+    assert shear_modes(rigid, limit.ravel(), 4).stiffness.size == 1
 
 
 def test_exact_finer_bricks_keep_partial_slip():

@@ -8,10 +8,10 @@ import pytest
 from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, make_compliance
 from pressed import press
 from study_module import load_study
+from support.pieces import compute_row_heights
 
 from patchfem.contact.gaps import crown
 from patchfem.mesh import TensorGrid
-from patchfem.mesh.grid import compute_row_heights
 
 halfspace = load_study("common/halfspace.py")
 MODULUS = exact.combined_modulus(*CARBIDE)

@@ -185,8 +185,9 @@ def test_exact_cycling_sets_are_solved_by_gradients():
     gap = np.array([2e-9, -8e-9, 8e-9])
     x = np.array([-1e-3, 0, 1e-3])
     problem = make_problem(x, gap, Holders(np.nan))
-    for start in (gap < 0, np.ones(3, bool)):
-        assert unilateral.solve_on_table(CYCLE, problem, start) is None
+    for start in (gap < 0, np.ones(3)):
+        near = unilateral.ContactSolution(1.0 * start, np.zeros(0))
+        assert unilateral.solve_on_table(CYCLE, problem, near) is None
     state = press_to_approach(make_pair(x, CYCLE), gap + 8e-9, 8e-9)
     (expected,) = solve_by_enumeration(CYCLE, x, gap)
     assert nodal_forces(make_pair(x, CYCLE), state) == pytest.approx(expected, rel=1e-12)
@@ -201,10 +202,10 @@ def test_exact_gradients_agree_with_enumeration(moment, spring):
     problem = make_problem(
         x, gap, Holders(5.0, moment=np.nan if moment is None else moment, spring=spring)
     )
-    force, _, _, n_iterations, _ = unilateral.solve_by_gradients(c, problem)
+    force, _ = unilateral.solve_by_gradients(c, problem)
     expected = solve_by_enumeration(c, x, gap, 5.0, moment, spring)[0]
     assert force == pytest.approx(expected, abs=5e-5)
-    assert n_iterations < 300 and 2 < np.count_nonzero(expected) < 7
+    assert 2 < np.count_nonzero(expected) < 7
 
 
 # ---- random gaps on random compliances

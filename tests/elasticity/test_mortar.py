@@ -10,12 +10,12 @@ import pytest
 from any_mesh_cases import mesh_of_grid
 from pieces import HEIGHT, LENGTH, TITANIUM, make_bare_layers, make_refined_grid
 from pressed import press
+from support.pieces import compute_row_heights
 
 from patchfem.contact.gaps import crown
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import PieceInterface, elasticity, mortar, recovery
 from patchfem.mesh import TensorGrid, tributary_lengths
-from patchfem.mesh.grid import compute_row_heights
 
 HALF_WIDTH = 0.1e-3  # half-width of the Hertz contact [m]
 LOAD = 9107.0  # per metre of width [N/m]

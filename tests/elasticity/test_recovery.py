@@ -10,6 +10,7 @@ from any_mesh_cases import mesh_of_grid, triangulate_graded_rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM, make_bare_layers, make_refined_grid
+from support.pieces import compute_row_heights
 
 from patchfem.elasticity import (
     Cells,
@@ -23,7 +24,6 @@ from patchfem.elasticity import (
     make_points,
 )
 from patchfem.mesh import TensorGrid, make_graded_grid
-from patchfem.mesh.grid import compute_row_heights
 
 HALF_WIDTH, LOAD = 0.1e-3, 9107.0
 P0 = 2 * LOAD / (np.pi * HALF_WIDTH)

@@ -102,6 +102,7 @@ def test_exact_closed_curve_ends_after_one_turn():
 
     closed = MotionCurve(make, start, 0.0, has_kinks=False).follow((-0.2, 0.2), PathSettings())
     assert closed.ended == "loop" and closed.folds == pytest.approx((0.1, -0.1), rel=2e-3)
+    assert (np.abs(np.array(closed.folds) - (0.1, -0.1)) < closed.fold_errors).all()
     p = np.array([point.w[-1] for point in closed.points])
     size = np.array([point.motion.run.values[AMPLITUDE] for point in closed.points])
     turned = np.unwrap(np.arctan2(p / 0.1, (size - size.mean()) / np.ptp(size)))

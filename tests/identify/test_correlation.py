@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.identify import Problem
-from patchfem.identify.correlation import estimate_effective_rows
+from patchfem.identify.intervals import estimate_effective_rows
 
 
 def autoregressive_noise(n_samples, correlation, seed):

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
-from patchfem.identify import Problem, describe_fit, least_squares
-from patchfem.identify.space import make_search_space
+from patchfem.identify import Problem, descent, describe_fit
+from patchfem.identify.descent import make_search_space
 
 RNG = np.random.default_rng(7)
 DESIGN = RNG.normal(size=(30, 3))
@@ -211,16 +211,6 @@ def test_always_isolated_start_is_not_converged():
     assert Problem(residual, [0.0], [1.0], start=[0.0]).solve().outcome is Outcome.NOT_CONVERGED
 
 
-def test_always_lower_end_that_no_start_reached_is_not_converged(monkeypatch):
-    """Two starts with the same end do not confirm the lower end of an unfinished last descent."""
-    problem = Problem(lambda v: v[0] - np.array([1.0, 1.1]), [0.0], [1.0], is_expensive=True)
-    for cost, outcome in ((9.0, Outcome.NOT_CONVERGED), (2.21, Outcome.DONE)):
-        ends = [least_squares.Descent(np.array([0.0]), one, False, 2) for one in (cost, cost, 2.21)]
-        following = iter(ends)
-        monkeypatch.setattr(least_squares, "descend", lambda *_, ends=following, **__: next(ends))
-        assert problem.search(2).outcome is outcome
-
-
 def test_refuses_unsolvable_fits():
     """Failing residuals, too few rows and invalid bounds raise an error with the reason."""
     with pytest.raises(
@@ -284,8 +274,8 @@ def test_exact_descent_begins_at_bound_beside_failures():
     def residual(values):
         return np.where(values > 5e-4, np.nan, values - 2e-4)
 
-    model = least_squares.UnitCubeResidual(residual, make_search_space([0.0], [1.0]))
-    found = least_squares.descend(model, [0.0], [0])
+    model = descent.UnitCubeResidual(residual, make_search_space([0.0], [1.0]))
+    found = descent.descend(model, [0.0])
     assert found.is_converged and found.u == pytest.approx([2e-4], abs=1e-9)
 
 

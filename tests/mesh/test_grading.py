@@ -5,7 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.mesh import Layout, divide_into_columns, divide_into_rows, make_graded_grid
+from patchfem.mesh import (
+    Layout,
+    RowHeights,
+    divide_into_columns,
+    divide_into_rows,
+    make_graded_grid,
+)
 
 
 @given(
@@ -20,9 +26,7 @@ def test_always_column_widths_follow_layout(position, min_size, slope, span):
     layout = Layout(
         -0.5,
         0.5,
-        ((position, position, min_size),),
-        (low, position),
-        max(min_size, 0.05),
+        ((position, position, min_size), (low, position, max(min_size, 0.05))),
         0.1,
         slope,
     )
@@ -39,10 +43,8 @@ def test_always_column_widths_follow_layout(position, min_size, slope, span):
 @pytest.mark.parametrize("coating", [0.0, 0.2])
 def test_exact_row_boundary_at_coating(coating):
     """A boundary of rows is exactly at the coating thickness."""
-    layout = Layout(
-        0.0, 1.0, ((0.0, 0.0, 0.02), (coating, coating, 0.03)), (0.0, 1.0), 0.2, 0.2, 0.5
-    )
-    depth, coated = divide_into_rows(layout, coating)
+    rows = RowHeights(first=0.02, last=0.2, coating=0.03, largest=0.2, growth=0.5)
+    depth, coated = divide_into_rows(1.0, coating, rows)
     assert (
         depth[0] == 0 and depth[-1] == 1 and depth[coated] == coating and np.diff(depth).min() > 0
     )

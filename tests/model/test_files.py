@@ -166,3 +166,11 @@ def test_exact_check_and_run_report_same_profile_notes(tmp_path):
     texts = [text for text in (*answer["notes"], *answer["warnings"]) if "p.csv" in text]
     assert lines == [f"note: {text}" for text in texts]
     assert run_cli("check", tmp_path / "scene.toml", "--json").content["notes"] == texts
+
+
+def test_check_reads_spectrum_of_random_drive(tmp_path):
+    """`check` names the fault of a spectrum file of a random drive. It ended with an internal fault for every such file."""
+    text = DRIVE.replace('"file"', '"random"', 1) + 'duration = "2 s"\n'
+    content = "frequency [Hz],density [g^2/Hz]\n10,0.01\n500,0.01\n"
+    code, lines = check_scene_with_file(tmp_path, text, "spectrum.csv", content)
+    assert code == 2 and "no column level" in lines[0]

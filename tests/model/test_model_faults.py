@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.model import SlidePath
-from patchfem.model.load import PointLoad
+from patchfem.model.slide import PointLoad
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.7, -2.0])

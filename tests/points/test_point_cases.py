@@ -7,7 +7,7 @@ import pytest
 
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.friction import make_law
-from patchfem.points import case_rows, cases, laws
+from patchfem.points import cases, laws, rows
 
 OMEGA = 2 * np.pi * 143.0
 LIMIT = 40.0  # friction limit [N] of 1 kg
@@ -38,10 +38,10 @@ def make(name, accelerations=(DRIVE.acceleration,), ratio=1.0, cycles=200, **cha
         *laws.list_point_law(name, law, load),
         OMEGA**2,
     ]
-    rows = np.column_stack(np.broadcast_arrays(*columns))
-    n = len(case_rows.Number)
-    *arrays, reference = np.split(rows, [n, -1], axis=1)
-    return case_rows.Cases(*map(np.ascontiguousarray, arrays), reference[:, 0])
+    table = np.column_stack(np.broadcast_arrays(*columns))
+    n = len(rows.Number)
+    *arrays, reference = np.split(table, [n, -1], axis=1)
+    return rows.Cases(*map(np.ascontiguousarray, arrays), reference[:, 0])
 
 
 def test_coulomb_block_at_resonance():

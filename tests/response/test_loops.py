@@ -59,13 +59,10 @@ def test_exact_jenkins_loop_agrees_with_closed_form(amplitude, length):
     area, _ = friction_forms.jenkins_loop(amplitude, length)
     assert work == pytest.approx(float(area), rel=1e-6, abs=1e-12)
     turns = loops.find_reversals(t, q, v, f, PERIOD)
-    assert loops.compute_mean_half_range(turns) == pytest.approx(amplitude, rel=1e-12)
-    assert loops.compute_secant_stiffness(turns) == pytest.approx(
-        1 / max(amplitude, length), rel=1e-9
-    )
-    found = loops.compute_interface_loop(
-        loops.compute_mean_half_range(turns), *fourier_coefficients(t, q, f), work, 0.5
-    )
+    assert turns[:, [0, 2]] == pytest.approx(np.array([[-amplitude, amplitude]]), rel=1e-12)
+    harmonics = fourier_coefficients(t, q, f)
+    found = loops.measure_sampled_loop(turns, loops.CycleLoop(*harmonics, work), 0.5)
+    assert found["secant_stiffness"] == pytest.approx(1 / max(amplitude, length), rel=1e-9)
     turn = acos(1 - 2 * length / amplitude) if amplitude > length else pi
     stiffness = (turn - sin(2 * turn) / 2) / (pi * length)
     assert found["loop_area"] == work
@@ -80,7 +77,7 @@ def sample_slide_densely(done, begin: float, samples: int = 20_000) -> np.ndarra
     model = done.plan.model
     rig = done.plan.model.rig
     times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD
-    law = problems.make_coulomb(*model.friction_limits(model.point.load))
+    law = problems.make_coulomb(*model.rig.friction.interfaces[0].friction_limits(model.point.load))
     motion = problems.run_motion(rig.modes, rig.drive.signal, [law], rig.drive.cycles, times)
     response = motion.make_response(rig.modes, rig.drive.signal)
     return response.slide[np.searchsorted(response.time, times)]

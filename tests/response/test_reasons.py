@@ -36,7 +36,7 @@ def make_window(stored: float, lost: float) -> SimpleNamespace:
     time = np.linspace(0.3, 0.5, 5)
     rise = np.linspace(0, 1, 5)
     ledger = np.stack([(stored + lost) * rise, 7.0 + stored * rise, 2.0 + lost * rise, 0 * rise])
-    return SimpleNamespace(time=time, extra={"ledger": ledger})
+    return SimpleNamespace(span=time[-1] - time[0], extra={"ledger": ledger})
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,9 @@ def test_exact_hard_wedge_on_springs(angle=2.8e-3):
     )
     check(result, contact_fraction=length / SIDE)
 
+    # The parabola through the largest pressures ends at the hardness
+    assert result.measures["pressure_peak"].value == hardness
+
     # Yielded cells are counted, here in whole columns, of which the edge may have two too many
     yielded = (length - hardness / slope) / SIDE
     check(result, 2 / result.patch.shape[1] / yielded, yielded_fraction=yielded)

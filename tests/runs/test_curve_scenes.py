@@ -66,6 +66,8 @@ def test_exact_linear_curve_agrees_with_modal_sum():
     assert peak_amplitude == pytest.approx(
         0.9 * LEVEL / (2 * ZETA * (2 * np.pi * 143) ** 2), rel=1e-4
     )
+    width = result.measures["peak_width"]
+    assert abs(width.value - 2 * ZETA * 143) < width.error < 1e-4 * width.value
     peak = result.measures["peak_frequency"]
     assert abs(peak.value - 143 * np.sqrt(1 - 2 * ZETA**2)) < peak.error < 0.2
 

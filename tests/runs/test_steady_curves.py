@@ -102,8 +102,8 @@ def test_exact_number_of_steady_motions_is_stated():
     middle = min(unstable, key=lambda point: abs(point.drive.omega - 2 * np.pi * 160))
     found = finder.compute_steady_motion(middle.drive, middle.guess)
     assert found.values[AMPLITUDE] < 0.5 * middle.values[AMPLITUDE]
-    assert np.abs(found.periodic.multipliers).max() < 1
-    (sentence,) = find_sentences(found.notes, "3 steady motions exist")
+    assert np.abs(found.steady.data.multipliers).max() < 1
+    (sentence,) = find_sentences(found.steady.notes, "3 steady motions exist")
     assert "2 of them stable; the stable motion of smallest amplitude is shown" in sentence
 
     def fail(drive):
@@ -111,7 +111,7 @@ def test_exact_number_of_steady_motions_is_stated():
 
     finder._list_coexisting_motions = fail
     found = finder.compute_steady_motion(middle.drive, middle.guess)
-    assert found.outcome == "not_converged" and not found.notes
+    assert found.run.outcome == "not_converged" and not found.steady.notes
     assert found.values[AMPLITUDE] == pytest.approx(middle.values[AMPLITUDE], rel=1e-6)
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from pieces import grow_depth
 from scene_texts import COATED
+from support.pieces import compute_row_heights
 from wedges import singularity_exponent
 
 from patchfem import build
 from patchfem.core import frozen_array
 from patchfem.mesh import TensorGrid
-from patchfem.mesh.grid import compute_row_heights
 from patchfem.model import extend_grid, make_piece_meshes
 from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.press import solve_patch_contact

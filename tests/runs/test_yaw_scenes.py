@@ -6,7 +6,7 @@ from scene_texts import BLOCK, DRIVE, MODE, make_friction_table
 
 from patchfem import load, plan
 from patchfem.export.run_data import collect_data
-from patchfem.runs.rig.bands import compute_band_loads, number_bands
+from patchfem.runs.interfaces.bands import compute_band_loads, number_bands
 from patchfem.runs.run import run
 
 AREA = "[contact.area]\ncells = 32\n"

@@ -9,6 +9,7 @@ from scene_texts import BENCH, FULL, LINEAR, PATCH, RIG
 
 from patchfem.scene import load, loads
 from patchfem.scene.lines import find_key_lines
+from patchfem.scene.scene import SceneError
 
 
 def test_exact_rig_scene_has_si_values():
@@ -107,3 +108,16 @@ v = 1979-05-27 07:32:00
                 "s.m.1.sub.w": 16, "s.m.1.sub.v": 17}  # fmt: skip
     assert {key: lines.get(key) for key in expected} == expected
     assert "no" not in lines and not any("x = 1" in key for key in lines)
+
+
+@pytest.mark.parametrize(
+    "kind, levels, expected",
+    [("base", "2 m/s^2..6 m/s^2:3", [2, 4, 6]), ("force", "1 N..100 N:3", [1, 50.5, 100])],
+)
+def test_exact_range_of_levels_stands_for_its_values(kind, levels, expected):
+    """A range of levels stands for its values with equal steps; one without a number of values is refused."""
+    drive = f'[drive]\nkind = "{kind}"\nwaveform = "levels"\nfrequency = "143 Hz"\ncycles = 9\n'
+    text = RIG.partition("[drive]")[0] + drive
+    assert loads(f'{text}levels = "{levels}"\n').drive.levels == pytest.approx(expected)
+    with pytest.raises(SceneError, match="number of values after a colon"):
+        loads(f'{text}levels = "{levels[:-2]}"\n')

@@ -95,7 +95,8 @@ def make_pair(kind="mixed", grid=GRID):
 
     Node j*ny + i of a piece is column j, row i; the upper piece follows the lower one.
     """
-    points, ((_, quads, names), (_, edges, ends)) = join_meshes(grid, grid)
+    points, blocks = join_meshes(grid, grid)
+    (quads, names), (edges, ends) = blocks.values()
     tags, edge_tags = (
         np.array([(CELL_TAGS | EDGE_TAGS)[name] for name in group], np.int32)
         for group in (names, ends)

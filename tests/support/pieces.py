@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
+from math import ceil, log
 
 import numpy as np
 
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import Layers, Piece, compute_interface_compliance
 from patchfem.mesh import TensorGrid, make_graded_grid
-from patchfem.mesh.grid import compute_row_heights
 
 TITANIUM = (121e9, 0.32)
 CARBIDE = (250e9, 0.24)  # Sprayed WC-Co; this is the value that the project assumes.
@@ -19,6 +19,46 @@ COATING = 152.4e-6
 LOAD = 26 * 4.4482216152605
 COATED = Layers(CARBIDE, TITANIUM, "strain")
 TILTS = (0.0, 1e-5, 1e-4, 1e-3)
+
+
+def compute_row_heights(
+    first_height: float, total_height: float, growth: float = 1.1, min_rows: int = 1
+) -> np.ndarray:
+    """Compute heights of rows that grow with a constant ratio and add up to a total.
+
+    Parameters
+    ----------
+    first_height : float
+        Height of the first row [m], or a little less.
+    total_height : float
+        Sum of the heights [m].
+    growth : float
+        Largest ratio of successive heights, above 1.
+    min_rows : int
+        Minimum number of rows.
+
+    Returns
+    -------
+    (ny,) ndarray
+        Heights [m], the smallest first.
+    """
+    first_height = min(first_height, total_height / min_rows)
+    n_rows = max(
+        min_rows, ceil(log(1 + total_height * (growth - 1) / first_height) / log(growth) - 1e-9)
+    )
+    if n_rows * first_height >= total_height * (1 - 1e-12):
+        return np.full(n_rows, total_height / n_rows)
+    # The sum is convex in the ratio, so Newton steps from above decrease until round-off.
+    powers = np.arange(n_rows)
+    next_ratio = growth * (1 + 1e-6) + 1e-6
+    ratio = np.inf
+    while next_ratio < ratio:
+        ratio = next_ratio
+        rows = ratio**powers
+        derivative = first_height * (powers[1:] @ rows[:-1])
+        next_ratio = ratio - (first_height * rows.sum() - total_height) / derivative
+    rows = first_height * ratio**powers
+    return rows * (total_height / rows.sum())
 
 
 def make_bare_layers(material, plane="strain") -> Layers:

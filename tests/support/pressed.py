@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from patchfem.contact import Holders, press_patch
-from patchfem.contact.press import PatchState
+from patchfem.contact.press import Pressed
 from patchfem.core import Compliance, Interface, Outcome
 
 
@@ -47,7 +47,7 @@ def press_to_approach(pieces, gap, approach) -> PressedPatch:
     return press_by_holder(pieces, gap, Holders(np.nan, approach))
 
 
-def solve_forces(c, x, gap, target) -> PatchState:
+def solve_forces(c, x, gap, target) -> Pressed:
     """Solve the contact problem of a patch that is given as NumPy arrays.
 
     Parameters

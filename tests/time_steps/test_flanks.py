@@ -14,7 +14,7 @@ from patchfem import load
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds, Grooves
 from patchfem.motion_measures import energy_balance
-from patchfem.runs.bench import contact_points
+from patchfem.runs.interfaces import contact_points
 from patchfem.scene.keys.tables import Friction
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.time_steps import laws
@@ -93,7 +93,7 @@ def make_coulomb_contact(grooves, tolerance, compliance=COMPLIANCE):
     """Return points on flanks with Coulomb friction."""
     bodies = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
     patch = Patch(
-        model=SimpleNamespace(area=None),
+        model=SimpleNamespace(area=None, gap=SimpleNamespace(side="upper")),
         x=POSITIONS,
         pressure=SimpleNamespace(sigma_n=LOAD * LOAD_FRACTION, load=LOAD),
         pieces=bodies,
@@ -107,9 +107,11 @@ def make_coulomb_contact(grooves, tolerance, compliance=COMPLIANCE):
         load_varies=False,
         side="upper",
         speed_scale=1.0,
+        point=None,
         accuracy=SimpleNamespace(tolerance=tolerance, shear_modes=None),
     )
-    return contact_points.make_contact(model, patch)
+    numerics = SimpleNamespace(meshed=(), shear_modes=None)
+    return contact_points.make_contact(model, numerics, patch)
 
 
 def solve_coulomb_points(grooves, slide, compliance):

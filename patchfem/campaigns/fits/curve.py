@@ -72,6 +72,7 @@ class CurveComparison(Comparison):
 
     default_starts = 6
     values_name = "values"
+    is_expensive = True
     interval_kind = IntervalKind.SERIES
 
     def __init__(self, scene: Scene, path: Path, ranges: Sequence[Range]):

@@ -18,7 +18,7 @@ from ...inputs.loops import Loop, read_loop
 from ...model.model import Model, build
 from ...model.source import locate_errors
 from ...runs.bench.bench import run_bench
-from ...runs.bench.engine import choose_smooth_bond_summation
+from ...runs.interfaces.bond_lists import choose_slide_summation
 from ...runs.patch.condensed import CondensedPair
 from ...runs.patch.mesh_levels import condense_for_contacts, solve_on_other_mesh
 from ...scene.assignments import Range
@@ -114,7 +114,7 @@ class LoopComparison(Comparison):
         number = np.arange(corner[-1] + 1)
         time = np.interp(number, corner, self.time)
         displacement = np.interp(number, corner, self.loop.displacement)
-        choice = choose_smooth_bond_summation(model, displacement)
+        choice = choose_slide_summation(model, displacement, is_smooth=True)
         samples = (time, displacement, 0, 0.0)
         run = run_bench(model, patch, 4, path=samples, choice=choice, say=self.listener.say)
         if not run.load[0] > 0:

@@ -14,8 +14,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core import NotConverged, Outcome, PatchfemError
-from ...identify.advice import advise_test
-from ...identify.fit_sentences import describe_fit
+from ...identify.fit_sentences import advise_test, describe_fit
 from ...identify.intervals import IntervalKind
 from ...identify.least_squares import Fit, Problem
 from ...model.rig import JOINT_TABLES
@@ -75,8 +74,7 @@ class Comparison(ABC):
     listener = SILENT_LISTENER
     # What the values are called in messages.
     values_name = "rows"
-    # Whether the model takes so long to compute that all descents but the last use a looser tolerance and one-sided
-    # differences.
+    # Whether the model takes so long to compute that descents use a looser tolerance, one-sided differences and secants.
     is_expensive = False
     interval_kind = IntervalKind.ROWS
 

@@ -184,6 +184,12 @@ def write_plot(answer: Answer, path: Path) -> None:
         save_figure(figure, partial, ending)
 
 
+def list_titles(answer: Answer) -> list[str]:
+    """Return the titles of the charts for which an answer has data, in the order of its page."""
+    charts = [chart for chart in CHARTS[answer.kind] if make_panels({"": answer}, (chart,))]
+    return list(dict.fromkeys(chart.title for chart in charts))
+
+
 def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
     """Draw the charts of an answer with some titles, and return the first Axes; None if it has none of them.
 

@@ -13,8 +13,9 @@ from ...disk.atomic_write import write_atomically
 from ...model.model import Model
 from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...model.source import locate_errors
+from ...runs.interfaces.joints import list_parts
 from ...runs.patch import mesh_levels
-from ...runs.rig import engines, joints
+from ...runs.rig import engines
 
 
 def export_structure(model: Model, out: Path) -> str:
@@ -124,7 +125,7 @@ def make_elements(model: Model) -> dict[str, np.ndarray]:
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
 
-    groups = [_sort_elements(*joint.list_elements()) for joint in joints.list_joints(model, patch)]
+    groups = [_sort_elements(*joint.list_elements()) for joint in list_parts(model, patch)]
     stiffness, yields = (np.concatenate(parts) for parts in zip(*groups))
     direction = np.repeat(modes.interfaces, [group[0].size for group in groups], axis=0)
     return {"limit": stiffness * yields, "stiffness": stiffness, "direction": direction}

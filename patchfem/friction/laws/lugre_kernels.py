@@ -19,7 +19,7 @@ MIN_LIMIT_RATIO = 1e-9
 class LuGreNumber(IntEnum):
     """Indices of the parameters of the law.
 
-    Index 0 has the number of the law (`points.law_rows.Law`).
+    Index 0 has the number of the law (`points.rows.Law`).
 
     - STATIC, KINETIC: static and kinetic friction force [N]
     - STIFFNESS: stiffness [N/m]

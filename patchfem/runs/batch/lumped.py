@@ -19,18 +19,9 @@ from ...friction.bonds.parameters import Bonds
 from ...friction.record import make_law
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns, select_models
-from ...points.case_rows import (
-    MAX_STEP_PHASE,
-    MAX_STEPS,
-    SAME_CASE_CYCLE,
-    SAME_SMOOTH_CYCLE,
-    WINDOW_STEPS,
-    Cases,
-    Number,
-)
 from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
-from ...points.law_rows import Law, LawNumber
 from ...points.laws import N_NUMBERS, POINT_LAWS, list_point_law
+from ...points.rows import Cases, Law, LawNumber, Number
 from ...response import rows
 from ...response.errors import ERROR_MEASURES, combine_errors, estimate_convergence_errors
 from ...response.outcome import (
@@ -73,11 +64,7 @@ POOLED_ERROR = 0.5
 # Measures whose error is not relative to their value
 UNPOOLED_MEASURES = {"drift_per_cycle", *ERROR_MEASURES}
 EXACT_STEPS_PER_CYCLE = 16  # steps of laws that are linear between events, which are exact
-# Relative error of the integral of the polynomial of order 5 over a cycle, by d p^5, with the phases d of the drive and p of
-# the fastest vibration in a step. That of a step has p^7; between two events these are a difference, of which the ends with
-# p^6 remain. The ends of a cycle are about as many as its radians.
-INTEGRAL_REMAINDER = 1 / 100_800
-DISTORTION = "acceleration_distortion"
+EXACT_ROUND_OFF = 1e-12  # round-off of their measures, relative to the value
 # Smallest distance of the drive from the frequencies of an undamped mode, relative to the squared frequency of the drive,
 # at which forced and free motion do not cancel to more than half the digits
 MIN_DETUNING = 1e-6
@@ -92,6 +79,7 @@ MAX_STICKING_SLIP_RATIO = 1e-3
 MAX_MICRO_DAMPING_RATIO = 4.0
 # Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
 MEASURE_CHANGE_ROUND_OFF = 1e-12
+DRIFT = "drift_per_cycle"  # name of the measure, which is the difference of two cycles
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 CREEP_KEY = "friction.reference_speed"  # key on which the note on creep depends
 
@@ -291,7 +279,7 @@ def refine(group: Group) -> Iterator[tuple[np.ndarray, Refined]]:
     for count in BATCH_STEPS_PER_CYCLE[1:]:
         part = _select(group, remaining)
         fine = march_cases(part.cases, count)
-        errors = estimate_errors(part, [fine.values, *coarser], count)
+        errors = estimate_errors(part, fine, coarser)
         is_met = np.ones(remaining.size, bool)
         for name in fine.values.keys() - set(INTERNAL_VALUES):
             value = fine.values[name]
@@ -311,15 +299,15 @@ def refine(group: Group) -> Iterator[tuple[np.ndarray, Refined]]:
         coarser = [_select(values, ~is_done) for values in (fine.values, coarser[0])]
 
 
-def find_repeat_error(group: Group, same: float) -> np.ndarray:
+def find_repeat_error(group: Group, march: CaseMarch) -> np.ndarray:
     """Return the relative error (n,) that is due to the cycles which are not computed because the motion repeats.
 
-    The last computed cycle differs from the one before by at most `same`, relative to the range of the motion. The
+    The last computed cycle differs from the one before by `march.repeat`, relative to the range of the motion. The
     differences of the others decrease at least as fast as the mode rings down, so that their sum is that of a geometric
     series.
     """
     decrease = -np.expm1(-np.pi * group.read(Number.DAMPING) / group.read(Number.OMEGA))
-    return same / np.maximum(decrease, 1 / group.read(Number.CYCLES))
+    return march.repeat / np.maximum(decrease, 1 / group.read(Number.CYCLES))
 
 
 def find_size(name: str, values: dict[str, np.ndarray]) -> np.ndarray:
@@ -331,23 +319,25 @@ def find_size(name: str, values: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def estimate_errors(
-    group: Group, marches: Sequence[dict[str, np.ndarray]], steps: int
+    group: Group, march: CaseMarch, coarser: Sequence[dict[str, np.ndarray]]
 ) -> dict[str, np.ndarray]:
-    """Return the errors (n,) by name from the values of a march and of one or two coarser ones.
+    """Return the errors (n,) by name of a march from the values of one or two coarser ones.
 
     Parameters
     ----------
     group : Group
         The n cases.
-    marches : sequence of dict
-        Values (n,) by name; each march after the first has half the steps of the one before.
-    steps : int
-        Steps per cycle of the first march.
+    march : CaseMarch
+        March of the cases.
+    coarser : sequence of dict
+        Values (n,) by name of marches with half the steps of the one before.
     """
-    fine = marches[0]
-    repeat_error = find_repeat_error(group, SAME_SMOOTH_CYCLE / steps**3)
+    fine = march.values
+    repeat_error = find_repeat_error(group, march)
     with np.errstate(all="ignore"):
-        errors = estimate_convergence_errors(*marches, order=BATCH_ORDER, max_order=BATCH_ORDER)
+        errors = estimate_convergence_errors(
+            fine, *coarser, order=BATCH_ORDER, max_order=BATCH_ORDER
+        )
 
         # A change that is small by accident does not give an error far below those of the other measures, relative to
         # the value of a measure or to the terms of a difference.
@@ -361,7 +351,8 @@ def estimate_errors(
         for name, part in zip(names, pooled * is_changed):
             errors[name] += part * sizes[name]
         for name, error in errors.items():
-            errors[name] = combine_errors(name, fine, [error], repeat_error)
+            left_out = march.repeat if name == DRIFT else repeat_error
+            errors[name] = combine_errors(name, fine, [error], left_out)
         return errors
 
 
@@ -385,20 +376,16 @@ def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarra
         Error of each measure by name, in its unit.
     """
     values = march.values
-    repeat_error = find_repeat_error(group, SAME_CASE_CYCLE)
-    drive_phase, phase = find_step_phases(group)
+    repeat_error = find_repeat_error(group, march)
     errors = {}
     for name in values:
-        size = find_size(name, values)
-        relative = INTEGRAL_REMAINDER * drive_phase * phase**5
-        if name == DISTORTION:
-            # The acceleration of the third harmonic is 9 omega^2 times a slide that has three times the phase.
-            size = np.fmax(size, 1.0)
-            relative = relative + 9 * INTEGRAL_REMAINDER * drive_phase * (3 * drive_phase) ** 5
-        errors[name] = combine_errors(name, values, [relative * size], repeat_error)
+        round_off = EXACT_ROUND_OFF * find_size(name, values)
+        # A drift is the difference of two cycles.
+        left_out = march.repeat if name == DRIFT else repeat_error
+        errors[name] = combine_errors(name, values, [round_off], left_out)
 
     slide = values[AMPLITUDE] / np.abs(group.read(Number.OUTPUT))
-    difference = np.where(values["slip_amplitude"] > 0, repeat_error, SAME_CASE_CYCLE)
+    difference = np.where(values["slip_amplitude"] > 0, repeat_error, march.repeat)
     work = difference * values["friction_force_peak"] * slide
     errors["loop_area"] += work
     for name in select_names("run"):
@@ -407,22 +394,6 @@ def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarra
         ratio = np.abs(values["equivalent_damping"] / values["loop_area"])
         errors["equivalent_damping"] += ratio * work
     return errors
-
-
-def find_step_phases(group: Group) -> tuple[np.ndarray, np.ndarray]:
-    """Return the phases (n,) [rad] of the drive and of the fastest vibration in an exact step of the window.
-
-    Parameters
-    ----------
-    group : Group
-        The n cases.
-    """
-    added = group.read(Number.MOBILITY) * group.stick_stiffness
-    stiffness = group.read(Number.STIFFNESS) + added
-    ratio = np.fmax(np.sqrt(stiffness) / group.read(Number.OMEGA), 1.0)
-    n_steps = np.clip(2 * np.pi * ratio / MAX_STEP_PHASE, EXACT_STEPS_PER_CYCLE, MAX_STEPS)
-    drive = 2 * np.pi / (n_steps * WINDOW_STEPS)
-    return drive, drive * ratio
 
 
 def has_closed_form(group: Group) -> np.ndarray:

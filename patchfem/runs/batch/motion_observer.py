@@ -83,9 +83,9 @@ class MotionObserver:
         # Histories before the evaluated window are not needed.
         numerics = replace(self.numerics, whole=False)
         solution = solve_rig(model, numerics, self.patch, 0, self.report)
-        if solution.outcome in UNBOUNDED_OUTCOMES:
+        if solution.run.outcome in UNBOUNDED_OUTCOMES:
             return None
         peak, amplitude = (
             solution.values[COLUMN_MEASURES[name]] for name in ("acceleration_peak", "amplitude")
         )
-        return ObservedMotion(solution.window, peak, amplitude)
+        return ObservedMotion(solution.run.window, peak, amplitude)

@@ -13,10 +13,8 @@ from ...core import Response
 from ...motion_measures import energy_balance
 from ...response.loops import (
     choose_reversal_force_rule,
-    compute_interface_loop,
-    compute_mean_half_range,
-    compute_secant_stiffness,
     find_reversals,
+    measure_sampled_loop,
     sample_loop,
 )
 from ...response.measures import (
@@ -27,7 +25,7 @@ from ...response.measures import (
     interpolate_range,
 )
 from ..results.patch_rows import Values
-from .engine import BenchEngine, choose_bench_engine, sample_path
+from .engine import Numerics, make_bench_numerics, sample_path
 from .slides import SlideHistories, SlideTask, follow_path
 
 
@@ -40,7 +38,7 @@ class BenchRun(SlideHistories):
     - values: measures by name.
     - seconds: CPU time [s].
     - first: index of the sample at which the last cycle starts.
-    - engine: method that computed the friction force.
+    - numerics: settings of the run.
     """
 
     time: np.ndarray
@@ -50,7 +48,7 @@ class BenchRun(SlideHistories):
     values: Values
     seconds: float
     first: int
-    engine: BenchEngine
+    numerics: Numerics
 
     @property
     def last_cycle(self) -> Response:
@@ -78,8 +76,8 @@ class BenchRun(SlideHistories):
         )
 
 
-def run_bench(model, patch, steps: int, n_frames: int = 0, path=None, **settings) -> BenchRun:
-    """Compute the friction response of a model to its prescribed displacement.
+def run_bench(model, patch, steps: int, n_frames: int = 0, choice=None, **options) -> BenchRun:
+    """Compute the friction response of a model to its prescribed displacement with a number of steps.
 
     Parameters
     ----------
@@ -91,15 +89,35 @@ def run_bench(model, patch, steps: int, n_frames: int = 0, path=None, **settings
         Steps per cycle.
     n_frames : int
         Number of output frames of the fields.
-    path : tuple, optional
-        Displacement path in the form of `SlidePath.samples`; default: the path of the model.
-    **settings
-        Fields `choice`, by default chosen by the tolerance, and `has_half_cells` of `BenchEngine`, and fields `say` and
-        `progress` of `SlideTask`.
+    choice : EngineChoice, optional
+        Method of a sum over lists of bonds; default: by the tolerance.
+    **options
+        Path and callbacks of `follow_slide`.
+    """
+    numerics = make_bench_numerics(model, steps, options.get("path"))
+    numerics = replace(numerics, choice=numerics.choice and (choice or numerics.choice))
+    return follow_slide(model, numerics, patch, n_frames, **options)
 
-    Returns
-    -------
-    BenchRun
+
+def follow_slide(
+    model, numerics: Numerics, patch, n_frames: int = 0, path=None, **callbacks
+) -> BenchRun:
+    """Compute the friction response of a model to a prescribed displacement.
+
+    Parameters
+    ----------
+    model : Model
+        Model of a bench.
+    numerics : Numerics
+        Steps per cycle, and methods of bond summation and of shear.
+    patch : Patch or None
+        None for a single point.
+    n_frames : int
+        Number of output frames of the fields; the initial state is not one of them.
+    path : SlideSamples, optional
+        Displacement path; default: the path of the model.
+    **callbacks
+        Fields `say` and `progress` of SlideTask.
 
     Raises
     ------
@@ -107,45 +125,33 @@ def run_bench(model, patch, steps: int, n_frames: int = 0, path=None, **settings
         If the force of a step has too large an error.
     """
     begin = process_time()
-    time, slide, first, omega = sample_path(model, steps, path)
-    engine = choose_bench_engine(model, slide, settings.pop("choice", None))
-    engine = replace(engine, has_half_cells=settings.pop("has_half_cells", False))
-    stored = _choose_frames(slide.size, n_frames)
-    histories = follow_path(SlideTask(model, patch, time, slide, stored, engine, **settings))
-    jumps = choose_reversal_force_rule(model) == "jumps"
+    time, slide, first, omega = sample_path(model, numerics.steps, path)
+    frames = np.linspace(0, slide.size - 1, n_frames + 1).round().astype(int)[1:]
+    frames = np.unique(frames[frames > 0])
+    histories = follow_path(SlideTask(model, patch, numerics, time, slide, frames, **callbacks))
 
     # The measures of a loop exist only for a cyclic motion.
     values = _compute_measures(model, histories, first)
-    values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}
+    if omega:
+        values |= _compute_loop_measures(model, time, slide, histories, first, omega)
+    jumps = choose_reversal_force_rule(model) == "jumps"
     values["work_check"] = compare_loop_work(histories.ledger[0], [(slide, histories.force)], jumps)
 
     span = time[-1]  # Scaling by the time span avoids overflow for extremely slow motions.
     rate = np.zeros(time.size)
     if time.size > 2:
         rate = np.gradient(slide, time / span) / span
-
     return BenchRun(
         time=time,
         slide=slide,
         rate=rate,
-        frames=stored,
+        frames=frames,
         values=values,
         seconds=process_time() - begin,
         first=first,
-        engine=engine,
+        numerics=numerics,
         **vars(histories),
     )
-
-
-def _choose_frames(n_samples: int, n_frames: int) -> np.ndarray:
-    """Return the indices of the samples with stored fields; the initial state is not one of them."""
-    numbers = np.linspace(0, n_samples - 1, n_frames + 1).round().astype(int)[1:]
-    return np.unique(numbers[numbers > 0])
-
-
-def _find_largest(values) -> float:
-    """Return the largest magnitude of samples (k,)."""
-    return float(np.abs(values).max())
 
 
 def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Values:
@@ -171,7 +177,10 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Val
 
     # A force that depends on the slide alone is largest at a reversal, which is a sample.
     is_sampled = model.grooves is None and choose_reversal_force_rule(model) == "slide"
-    find_peak = _find_largest if is_sampled else compute_peak
+
+    def find_peak(values) -> float:
+        """Return the largest magnitude of a history (k,)."""
+        return float(np.abs(values).max()) if is_sampled else compute_peak(values)
 
     # Energy balance: work - change of stored energy - dissipated + created = 0.
     work, stored, dissipated, created = histories.ledger
@@ -223,20 +232,12 @@ def _compute_loop_measures(
     mean_force = (force[1:] + force[:-1]) / 2
     means = np.divide(np.diff(work), moves, out=mean_force, where=moves != 0)
 
-    reversals = find_reversals(
-        time,
-        slide,
-        np.zeros(time.size),
-        force,
-        time[-1] - time[0],
-        choose_reversal_force_rule(model),
-    )
+    rule = choose_reversal_force_rule(model)
+    still = np.zeros(time.size)
+    reversals = find_reversals(time, slide, still, force, time[-1] - time[0], rule)
 
     # Without a mode there is no stiffness that damping could refer to, hence the 0.
     harmonic = compute_step_harmonic(time, means, omega)
     loop = sample_loop(time, slide, harmonic, omega, work[-1] - work[0])
-    measures = compute_interface_loop(compute_mean_half_range(reversals), *loop, 0.0)
-    secant = compute_secant_stiffness(reversals)
-    if secant is not None:
-        measures["secant_stiffness"] = secant
+    measures = measure_sampled_loop(reversals, loop, 0.0)
     return measures | {"drift_per_cycle": float(slide[-1] - slide[0])}

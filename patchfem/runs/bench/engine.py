@@ -1,6 +1,6 @@
-"""Method and sizes of a bench run.
+"""Numerical settings of a motion, and the method, steps and sizes of a bench run.
 
-In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `BenchSizes`. A law without memory has a closed form, and
+In: a model with [slide]. Out: `Numerics`, steps per cycle and `BenchSizes`. A law without memory has a closed form, and
 parallel elements obey Masing's rules; contact points and lists of bonds use the compiled kernels of the rigs.
 """
 
@@ -10,64 +10,101 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import friction
 from ...effects import law_has_trait, law_supports
-from ...friction.bonds import engines as bond_engines
-from . import contact_points
+from ...model import slide as model_slide
+from ..interfaces import bond_lists
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_GROOVE_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
-
+MIN_RELATIVE_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 
 # Names of methods of computing the friction force. Summaries and plans print them, and the code compares with them.
 CLOSED_FORM = "closed form"
 PARALLEL_ELEMENTS = "parallel elements"
 CONTACT_POINTS = "contact points"
+BOND_LIST = "bond list"
 
 
 @dataclass(frozen=True, slots=True)
-class BenchEngine:
-    """Engine of a bench run: its computation method and settings.
+class Numerics:
+    """Numerical settings of a run of a rig or a bench.
 
-    - method: method of computing the friction force.
-    - choice: engine of bond summation with its settings; None for other methods.
-    - has_half_cells: whether an Iwan model has half of its cells, to estimate their error.
+    - engine: name of the engine.
+    - steps: time steps per cycle; of the engine `hybrid` the smallest number per shortest period of the drive.
+    - cycles, window: number of cycles of the run, and of the window at its end.
+    - shear_modes: number of shear modes; None: set by the tolerance.
+    - choice: method of bond summation; None: set by the tolerance and the steps.
+    - whole: whether the run stores the histories before the window, or draws the response curve beside its peak; coarse runs
+      may omit them.
+    - local: largest relative error per step of the engine `hybrid`.
+    - other_rig: index of the rig with other modes of a reduced structure, or None.
+    - meshed: indices of the interfaces whose patches have a coarser mesh.
+    - coarse_patch: how many times the mesh of the patch of [contact] is coarser by a factor of 2.
+    - stiffer_joint: whether a joint that is subtracted from bolted modes is stiffer by its error.
+    - has_half_cells: whether Iwan models of time steps have half their cells.
     """
 
-    method: str
-    choice: "bond_engines.EngineChoice | None" = None
+    engine: str
+    steps: int
+    cycles: float
+    window: int
+    shear_modes: int | None
+    choice: "friction.bonds.engines.EngineChoice | None" = None
+    whole: bool = True
+    local: float = 0.0
+    other_rig: int | None = None
+    meshed: tuple[int, ...] = ()
+    coarse_patch: int = 0
+    stiffer_joint: bool = False
     has_half_cells: bool = False
 
-    @property
-    def name(self) -> str:
-        """Name of the engine in summaries and plans."""
-        return f"bench, {self.method}"
+    def finer(self):
+        """Return finer settings for the next run.
+
+        The engine `hybrid` has a hundredth of the step error, and other engines have twice as many steps.
+        """
+        if self.local:
+            return replace(self, local=max(0.01 * self.local, MIN_RELATIVE_STEP_ERROR))
+        return replace(self, steps=2 * self.steps)
 
 
-def choose_bench_engine(
-    model, slide, choice: "bond_engines.EngineChoice | None" = None
-) -> BenchEngine:
-    """Choose the method that computes the friction force of a bench run.
+def make_bench_numerics(
+    model, steps: int, path: "model_slide.SlideSamples | None" = None
+) -> Numerics:
+    """Return the Numerics of a bench.
 
     Parameters
     ----------
     model : Model
-        Model of a bench, whose friction law decides.
-    slide : (k,)
-        Relative displacement [m].
-    choice : EngineChoice, optional
-        Method of the sum over bonds, if it is known.
+        Model of the bench.
+    steps : int
+        Steps per cycle.
+    path : SlideSamples, optional
+        Path in place of that of the model.
     """
-    f = model.friction
-    if law_has_trait(f.law, "memoryless") and not model.partial_slip:
-        return BenchEngine(CLOSED_FORM)
-    if uses_parallel_elements(model):
-        return BenchEngine(PARALLEL_ELEMENTS)
-    if not contact_points.sums_over_lists(model):
-        return BenchEngine(CONTACT_POINTS)
+    choice = None
+    if find_method(model).startswith(BOND_LIST):
+        slide = sample_path(model, steps, path).rel_disp
+        choice = bond_lists.choose_slide_summation(model, slide)
+    return Numerics("bench", steps, model.slide.cycles, 1, None, choice)
 
-    choice = choice or choose_bond_summation(model, slide)
-    kind = "bond lists" if model.partial_slip or model.side == "lower" else "bond list"
-    return BenchEngine(f"{choice.engine} {kind}", choice)
+
+def find_method(model) -> str:
+    """Return the method that computes the friction force of a bench."""
+    if law_has_trait(model.friction.law, "memoryless") and not model.partial_slip:
+        return CLOSED_FORM
+    if uses_parallel_elements(model):
+        return PARALLEL_ELEMENTS
+    if not bond_lists.sums_over_lists(model):
+        return CONTACT_POINTS
+    return f"{BOND_LIST}s" if model.partial_slip or model.side == "lower" else BOND_LIST
+
+
+def name_engine(model, choice) -> str:
+    """Return the name of the engine in summaries and plans, with the EngineChoice of its bond list or None."""
+    method = find_method(model)
+    return f"bench, {method}" if choice is None else f"bench, {choice.engine} {method}"
 
 
 def steps_per_cycle(model) -> int:
@@ -93,99 +130,17 @@ def has_changing_pressure(model) -> bool:
     return model.load_varies or model.side == "lower"
 
 
-def choose_bond_summation(model, slide) -> "bond_engines.EngineChoice":
-    """Choose the method of bond summation for an interface whose points all slide alike.
-
-    The method is chosen as in a rig. Its error refers to the largest force, which is small for
-    strokes that are short compared with the bond length. `slide` (k,) [m] is the relative
-    displacement.
-    """
-    law = model.bonds
-    accuracy = model.accuracy
-    stroke, steps = mean_stroke(slide)
-    stroke = max(stroke / law.length, 1e-9)
-    goal = accuracy.tolerance * min(1.0, stroke)
-    tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    requested = bond_engines.RequestedEngine(find_requested_engine(model), tail, accuracy.merge)
-    return bond_engines.choose_engine(law, goal, stroke, steps, requested)
-
-
-def find_requested_engine(model) -> str:
-    """Return the engine of bond summation that the scene requests, or "auto".
-
-    A list of each point becomes "merged", if the scene does not name a sum and the bonds keep the pressure at which they
-    formed: each step adds a strip to every list.
-    """
-    if not contact_points.sums_over_lists(model):
-        return "auto"
-    requested = model.accuracy.quadrature
-    if requested not in ("auto", "recursion"):
-        return requested
-    has_separate_lists = model.side == "lower" or (model.rig is not None and model.load_varies)
-    return "merged" if has_separate_lists else "auto"
-
-
-def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | None":
-    """Choose a bond summation without merging, so that the force is smooth in the parameters.
-
-    With merging, the summation error jumps when a parameter changes, which disturbs a fit. The
-    result is None for laws without bonds, and if the scene fixes the engine or the merging.
-    """
-    if (
-        not law_has_trait(model.friction.law, "bonds")
-        or model.accuracy.quadrature != "auto"
-        or model.accuracy.merge is not None
-    ):
-        return None
-    choice = choose_bond_summation(model, slide)
-    if choice.engine != "merged":
-        return choice
-    return replace(choice, engine="truncated", merge=0.0, error=choice.tail)
-
-
-def mean_stroke(slide) -> tuple[float, float]:
-    """Return the mean path [m] between two reversals of a slide (k,) [m], and the mean number of steps that move on it."""
-    moves = np.diff(slide)
-    directions = np.sign(moves[moves != 0])
-    count = 1 + np.count_nonzero(directions[1:] != directions[:-1])
-    return float(np.abs(moves).sum()) / count, max(directions.size / count, 1.0)
-
-
 def uses_parallel_elements(model) -> bool:
     """Return whether parallel elements compute a bench run, which they do exactly at a constant load."""
-    friction = model.friction
     is_constant = model.grooves is None and not has_changing_pressure(model)
-    is_known = law_supports(friction, "shear") or not model.partial_slip
-    return is_constant and is_known and law_supports(friction, "pieces")
+    is_known = law_supports(model.friction, "shear") or not model.partial_slip
+    return is_constant and is_known and law_supports(model.friction, "pieces")
 
 
-def nodal_element_limit(model, patch):
-    """Return the tractions (m,) [Pa] at which the nodes of a pressed patch slip, if parallel elements compute the slip.
-
-    The result is None for other methods, and for the cells of a face, whose tractions are interpolated.
-    """
-    is_exact = model.partial_slip and uses_parallel_elements(model) and model.patch.area is None
-    return model.friction.static * patch.pressure.sigma_n if is_exact else None
-
-
-class SlideSamples(NamedTuple):
-    """Samples of the path of a bench.
-
-    - time, slide (k,): times [s] and displacements [m].
-    - first: index of the sample at which the last cycle starts.
-    - omega: circular frequency of the cycle [rad/s]; 0 for a path that is not cyclic.
-    """
-
-    time: np.ndarray
-    slide: np.ndarray
-    first: int
-    omega: float
-
-
-def sample_path(model, steps: int, path: tuple | None = None) -> SlideSamples:
-    """Return the samples of a path, to which a varying load adds some.
-
-    It bends the force between the samples of the slide.
+def sample_path(
+    model, steps: int, path: "model_slide.SlideSamples | None" = None
+) -> "model_slide.SlideSamples":
+    """Return the samples of a path, to which a varying load adds some, because it bends the force between them.
 
     Parameters
     ----------
@@ -193,15 +148,15 @@ def sample_path(model, steps: int, path: tuple | None = None) -> SlideSamples:
         Model of a bench.
     steps : int
         Steps per cycle.
-    path : tuple, optional
-        Path in the form of `SlidePath.samples`; default: that of the model.
+    path : SlideSamples, optional
+        Path in place of that of the model.
     """
     time, slide, first, omega = path or model.slide.samples(steps)
     if model.load_varies:
         start = time[first]
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
-    return SlideSamples(time, slide, first, omega)
+    return model_slide.SlideSamples(time, slide, first, omega)
 
 
 class BenchSizes(NamedTuple):
@@ -219,13 +174,13 @@ class BenchSizes(NamedTuple):
 
 def count_bench_sizes(model) -> BenchSizes:
     """Count the unknowns and the samples of a bench run."""
-    slide = sample_path(model, steps_per_cycle(model)).slide
-    engine = choose_bench_engine(model, slide)
-    # The comparison runs keep their samples.
+    steps = steps_per_cycle(model)
+    choice = make_bench_numerics(model, steps).choice
     unknowns = {}
-    if engine.choice is not None and engine.choice.strips:
-        unknowns["bond_list_about"] = int(engine.choice.strips)
-    return BenchSizes(engine.name, unknowns, slide.size)
+    if choice is not None and choice.strips:
+        unknowns["bond_list_about"] = int(choice.strips)
+    n_samples = sample_path(model, steps).time.size
+    return BenchSizes(name_engine(model, choice), unknowns, n_samples)
 
 
 def compute_dimensionless_groups(model) -> dict[str, float]:

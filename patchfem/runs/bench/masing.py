@@ -26,17 +26,6 @@ class MasingHistory(NamedTuple):
     loss: np.ndarray
 
 
-class Elements(NamedTuple):
-    """Parallel elements.
-
-    - find_loop: function of amplitudes (k,) [m] that returns the `friction.SteadyLoop`s (k,).
-    - limit: force at which all elements slip [N].
-    """
-
-    find_loop: object
-    limit: float
-
-
 class _Branch(NamedTuple):
     """Branch of a path: place [m] and force [N] of its start, direction, and length over amplitude, 1 on first loading."""
 
@@ -45,24 +34,36 @@ class _Branch(NamedTuple):
     direction: float
     ratio: float
 
-    def follow(self, elements: Elements, slide) -> np.ndarray:
-        """Return force [N], and slip [m], work and loss [J] since the start of the branch, (4, k), at slides (k,) [m]."""
+    def follow(self, find_loop, limit: float, slide) -> np.ndarray:
+        """Return force [N], and slip [m], work and loss [J] since the start of the branch, (4, k).
+
+        Parameters
+        ----------
+        find_loop : callable
+            Function of amplitudes (k,) [m] that returns the steady loops.
+        limit : float
+            Force at which all elements slip [N].
+        slide : (k,) array
+            Slides [m].
+        """
         moved = np.asarray(slide) - self.place
         x = np.abs(moved) / self.ratio
-        loop = elements.find_loop(x)
+        loop = find_loop(x)
         loss = self.ratio * loop.area / 4
         work = self.force * moved + self.ratio**2 * (loop.area / 8 + x * loop.force / 2)
         force = self.force + self.ratio * self.direction * loop.force
-        return np.array([force, self.direction * loss / elements.limit, work, loss])
+        return np.array([force, self.direction * loss / limit, work, loss])
 
 
-def follow_masing(elements: Elements, slide) -> MasingHistory:
-    """Return the friction along a slide (k,) [m] that starts from rest.
+def follow_masing(find_loop, limit: float, slide) -> MasingHistory:
+    """Return the friction of parallel elements along a slide (k,) [m] that starts from rest.
 
     Parameters
     ----------
-    elements : Elements
-        Elements whose loops obey Masing's rules.
+    find_loop : callable
+        Function of amplitudes (k,) [m] that returns the `friction.SteadyLoop`s (k,) of the elements.
+    limit : float
+        Force at which all elements slip [N].
     slide : (k,) array
         Samples of the slide [m].
     """
@@ -79,15 +80,15 @@ def follow_masing(elements: Elements, slide) -> MasingHistory:
             stop = _find_end(branches, slide[0])
             count = np.searchsorted(direction * slide[first : end + 1], direction * stop, "right")
             part = slice(first, first + int(count))
-            values[:, part] = branches[-1].follow(elements, slide[part]) + before[:, None]
+            values[:, part] = branches[-1].follow(find_loop, limit, slide[part]) + before[:, None]
             first = part.stop
             if first <= end:
                 # The loop is closed, so that both of its branches are forgotten.
-                before += branches[-1].follow(elements, [stop])[:, 0]
+                before += branches[-1].follow(find_loop, limit, [stop])[:, 0]
                 del branches[-2:]
                 if not branches:
                     branches.append(_Branch(slide[0], 0.0, direction, 1.0))
-                before -= branches[-1].follow(elements, [stop])[:, 0]
+                before -= branches[-1].follow(find_loop, limit, [stop])[:, 0]
                 before[0] = 0.0
     return MasingHistory(*values)
 

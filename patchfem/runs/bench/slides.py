@@ -19,14 +19,10 @@ from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import masing_loop
 from ...friction.record import make_law
+from ..interfaces import averaged_law, contact_points
 from ..patch import jenkins_elements
-from . import averaged_law, contact_points, masing, shear
-from .engine import (
-    CLOSED_FORM,
-    PARALLEL_ELEMENTS,
-    BenchEngine,
-    has_changing_pressure,
-)
+from . import masing
+from .engine import CLOSED_FORM, PARALLEL_ELEMENTS, find_method, has_changing_pressure
 
 N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
 # Largest ratio of created to dissipated energy at which the created energy counts as round-off.
@@ -59,18 +55,18 @@ class SlideTask(NamedTuple):
     """Prescribed displacement of an interface.
 
     - model, patch: Model, and its Patch or None for a single point.
+    - numerics: numbers of shear modes and cells, and method of bond summation.
     - time, slide (k,): samples of time [s] and relative displacement [m].
     - frames (f,): indices of the samples at which fields are stored.
-    - engine: method of the friction force.
     - say, progress: callbacks for messages about compilation and for the completed fraction, or None.
     """
 
     model: object
     patch: object
+    numerics: object
     time: np.ndarray
     slide: np.ndarray
     frames: np.ndarray
-    engine: BenchEngine
     say: Callable | None = None
     progress: Callable | None = None
 
@@ -78,6 +74,11 @@ class SlideTask(NamedTuple):
     def weight(self) -> np.ndarray:
         """Areas (m,) [m2] of the interface nodes; 1 for a single point."""
         return np.ones(1) if self.patch is None else self.patch.pieces.interface.weight
+
+    @property
+    def averages_pressure(self) -> bool:
+        """Whether the law averages the pressure of a patch over the surface that a node has passed."""
+        return self.patch is not None and law_has_trait(self.model.friction.law, "averaged")
 
     def evaluate_pressure(self, samples) -> np.ndarray:
         """Return the pressures (n, m) [Pa] at the interface nodes, or the loads (n, 1) [N] of a point, at n samples."""
@@ -96,12 +97,38 @@ class SlideTask(NamedTuple):
 
     def compute_loads(self) -> np.ndarray:
         """Return the normal load (k,) [N] at each sample."""
+        size = self.slide.size
         if not has_changing_pressure(self.model):
-            return np.full(self.slide.size, float(self.evaluate_pressure([0])[0] @ self.weight))
-        blocks = np.array_split(
-            np.arange(self.slide.size), 1 + self.slide.size // time_steps.slides.BLOCK
-        )
+            return np.full(size, float(self.evaluate_pressure([0])[0] @ self.weight))
+        blocks = np.array_split(np.arange(size), 1 + size // time_steps.slides.BLOCK)
         return np.concatenate([self.evaluate_pressure(block) @ self.weight for block in blocks])
+
+    def find_limits(self, load, direction: float) -> np.ndarray:
+        """Return the friction limits (k,) [N] of a motion to +x (`direction` 1) or to -x (-1) at all samples.
+
+        The limit is mu N with the load N (k,) [N]. If the law acts on a pressure that is averaged along x, it is the sum
+        of the nodal limits, which depends on the position of the averaging windows, i.e. on the slide.
+        """
+        friction = self.model.friction
+        coefficient = friction.static if friction.kinetic is None else friction.kinetic
+        if not self.averages_pressure:
+            return coefficient * load
+        limits = []
+        for offset in self.slide if self.model.side == "lower" else np.zeros(1):
+            tractions = averaged_law.find_tractions(friction, self.patch, direction, float(offset))
+            limits.append(coefficient * float(tractions @ self.weight))
+        return np.broadcast_to(limits, load.shape)
+
+    def distribute_evenly(self, force, node_slip) -> tuple[np.ndarray, np.ndarray]:
+        """Return traction (f, m) [Pa] and slip (f, m) [m] in the frames where the pressed nodes slip alike.
+
+        The traction is in proportion to the pressure. `force` [N] and `node_slip` [m] are those of all samples (k,).
+        """
+        sigma = self.evaluate_pressure(self.frames)
+        load = sigma @ self.weight
+        ratio = np.divide(force[self.frames], load, out=np.zeros_like(load), where=load > 0)
+        slide = self.slide[self.frames, None]
+        return ratio[:, None] * sigma, np.where(sigma > 0, node_slip[self.frames, None], slide)
 
 
 def follow_path(task: SlideTask) -> SlideHistories:
@@ -112,9 +139,10 @@ def follow_path(task: SlideTask) -> SlideHistories:
     NotConverged
         If the force of a step has too large an error.
     """
-    if task.engine.method not in (CLOSED_FORM, PARALLEL_ELEMENTS):
+    method = find_method(task.model)
+    if method not in (CLOSED_FORM, PARALLEL_ELEMENTS):
         return _follow_by_points(task)
-    follow = _follow_without_memory if task.engine.method == CLOSED_FORM else _follow_elements
+    follow = _follow_without_memory if method == CLOSED_FORM else _follow_elements
     histories = follow(task)
     if task.progress is not None:
         task.progress(1.0)
@@ -152,14 +180,11 @@ def _follow_without_memory(task: SlideTask) -> SlideHistories:
         force[sample] = ratio * load[sample]
 
     # The tractions of a frame are in proportion to the friction limits.
-    frames = task.frames
-    if _averages_pressure(task):
+    tau, local = task.distribute_evenly(force, slide)
+    if task.averages_pressure:
+        frames = task.frames
         offsets = slide[frames] * (model.side == "lower")
         tau = averaged_law.distribute_slip_force(model.friction, task.patch, force[frames], offsets)
-    else:
-        ratio = np.divide(force, load, out=np.zeros_like(force), where=load > 0)
-        tau = ratio[frames, None] * task.evaluate_pressure(frames)
-    local = np.repeat(slide[frames, None], task.weight.size, axis=1)
     ledger = stack_energies(rises + losses, stored, losses)
     return SlideHistories(force, load, slide, ledger, tau, local)
 
@@ -170,14 +195,14 @@ def _slide_on_flat_surfaces(task: SlideTask, load) -> tuple[np.ndarray, np.ndarr
     The force is phi L, with the friction limit L under the pressure at the sample, and its fraction phi, from the
     direction or the speed of the step that ends there. The loss has the mean limit of both ends of the step.
     """
-    model = task.model
+    friction = task.model.friction
     moves = np.diff(task.slide)
-    is_set_valued = law_has_trait(model.friction.law, "set-valued")
+    is_set_valued = law_has_trait(friction.law, "set-valued")
     fraction = np.sign(moves)
     if not is_set_valued:
-        fraction = make_law(model.friction, 1.0).limit_fraction(moves, np.diff(task.time))
-    forward = _find_limits(task, load, 1.0)
-    back = _find_limits(task, load, -1.0)
+        fraction = make_law(friction, 1.0).limit_fraction(moves, np.diff(task.time))
+    forward = task.find_limits(load, 1.0)
+    back = task.find_limits(load, -1.0)
     begin = np.where(moves > 0, forward[:-1], back[:-1])
     end = np.where(moves > 0, forward[1:], back[1:])
     force = np.append(0.0, fraction * end)
@@ -188,36 +213,6 @@ def _slide_on_flat_surfaces(task: SlideTask, load) -> tuple[np.ndarray, np.ndarr
         limit = (forward if before > 0 else back)[sample + 1]
         force[sample + 1] = np.clip(before, -limit, limit)
     return force, fraction * (begin + end) / 2 * moves
-
-
-def _find_limits(task: SlideTask, load, direction: float) -> np.ndarray:
-    """Return the friction limits (k,) [N] of a motion to +x (`direction` 1) or to -x (-1) at all samples.
-
-    The limit is mu N with the load N (k,) [N]. If the law acts on a pressure that is averaged along x, it is the sum of
-    the nodal limits, which depends on the position of the averaging windows, i.e. on the slide of `task`.
-    """
-    coefficient = _find_coefficient(task)
-    if not _averages_pressure(task):
-        return coefficient * load
-    offsets = task.slide if task.model.side == "lower" else np.zeros(1)
-    limits = []
-    for offset in offsets:
-        traction = averaged_law.find_tractions(
-            task.model.friction, task.patch, direction, float(offset)
-        )
-        limits.append(coefficient * float(traction @ task.weight))
-    return np.broadcast_to(limits, load.shape)
-
-
-def _averages_pressure(task: SlideTask) -> bool:
-    """Return whether the law averages the pressure of a patch over the surface that a node has passed."""
-    return task.patch is not None and law_has_trait(task.model.friction.law, "averaged")
-
-
-def _find_coefficient(task: SlideTask) -> float:
-    """Return the coefficient of friction [1] of a law without memory in motion."""
-    friction = task.model.friction
-    return friction.static if friction.kinetic is None else friction.kinetic
 
 
 def find_rest_ends(model, slide) -> dict[int, float]:
@@ -252,7 +247,7 @@ def _climb_grooves(task: SlideTask, load, mean_load) -> tuple[np.ndarray, np.nda
     friction = task.model.friction
     moves = np.diff(slide)
     if law_has_trait(friction.law, "set-valued"):
-        back, forward = (_find_limits(task, load, sign) / load for sign in (-1.0, 1.0))
+        back, forward = (task.find_limits(load, sign) / load for sign in (-1.0, 1.0))
         # Index of the last step in which the interface moved, up to each step; -1 before the first one.
         last = np.maximum.accumulate(np.where(moves != 0, np.arange(moves.size), -1))
         direction = np.append(0.0, np.where(last < 0, 0.0, np.sign(moves)[last]))
@@ -321,48 +316,27 @@ def stack_energies(work, stored, losses) -> np.ndarray:
 
 
 def _follow_elements(task: SlideTask) -> SlideHistories:
-    """Compute the histories of parallel elements under a constant load by Masing's rules."""
+    """Compute the histories of parallel elements under a constant load by Masing's rules, which are exact."""
     model = task.model
-    patch = task.patch
     friction = model.friction
-    frames = task.frames
-    slide = task.slide
     load = task.compute_loads()
     law = make_law(friction, load[0])
     if not model.partial_slip:
-        elements = masing.Elements(partial(law.steady_loop, load[0]), friction.static * load[0])
-        history = masing.follow_masing(elements, slide)
-        tau, local = _distribute_evenly(task, history.force, history.slip)
+        loop = partial(law.steady_loop, load[0])
+        history = masing.follow_masing(loop, friction.static * load[0], task.slide)
+        tau, local = task.distribute_evenly(history.force, history.slip)
     else:
         # The stretches of the elements in a frame follow from the reversals before it.
-        found = jenkins_elements.elements(patch, friction.static, law.length)
-        limit = float(found.stiffness @ found.yield_displacement)
-        loop = partial(masing_loop, found.stiffness, found.yield_displacement)
-        history = masing.follow_masing(masing.Elements(loop, limit), slide)
-        states = masing.find_stretches(found.yield_displacement, slide, frames)
-        tau, local = slip.fields.compute_element_fields(patch, found, states, law.length)
+        found = jenkins_elements.elements(task.patch, friction.static, law.length)
+        yields = found.yield_displacement
+        loop = partial(masing_loop, found.stiffness, yields)
+        history = masing.follow_masing(loop, float(found.stiffness @ yields), task.slide)
+        states = masing.find_stretches(yields, task.slide, task.frames)
+        tau, local = slip.fields.compute_element_fields(task.patch, found, states, law.length)
 
     stored = history.work - history.loss
     ledger = stack_energies(np.diff(history.work), stored, np.diff(history.loss))
     return SlideHistories(history.force, load, history.slip, ledger, tau, local)
-
-
-def _distribute_evenly(task: SlideTask, force, local_slip) -> tuple[np.ndarray, np.ndarray]:
-    """Return traction (f, m) [Pa] and slip (f, m) [m] in the frames where the pressed nodes slip alike, in proportion to it.
-
-    Parameters
-    ----------
-    task : SlideTask
-        Frames and pressure.
-    force, local_slip : (k,) array
-        Friction force [N] and slip [m] at all samples.
-    """
-    frames = task.frames
-    sigma = task.evaluate_pressure(frames)
-    load = sigma @ task.weight
-    ratio = np.divide(force[frames], load, out=np.zeros_like(load), where=load > 0)
-    local = np.where(sigma > 0, local_slip[frames, None], task.slide[frames, None])
-    return ratio[:, None] * sigma, local
 
 
 # ---- contact points
@@ -371,23 +345,21 @@ def _distribute_evenly(task: SlideTask, force, local_slip) -> tuple[np.ndarray, 
 def _follow_by_points(task: SlideTask) -> SlideHistories:
     """Compute the histories of a law with memory by contact points along the path."""
     model = task.model
-    patch = task.patch
-    engine = task.engine
-    contact = contact_points.make_contact(
-        model, patch, engine.choice, has_half_cells=engine.has_half_cells
-    )
+    friction = model.friction
+    slide = task.slide
+    frames = task.frames
+    contact = contact_points.make_contact(model, task.numerics, task.patch)
 
     # Steps of equal durations are followed together; durations matter only to laws of the velocity.
     load = task.compute_loads()
     time = task.time
-    if _is_timeless(model):
-        time = np.arange(task.slide.size, dtype=float)
+    has_bonds = law_has_trait(friction.law, "bonds")
+    if not model.bonds.has_growth if has_bonds else law_has_trait(friction.law, "timeless"):
+        time = np.arange(slide.size, dtype=float)
         if contact.load is not None:
             contact = replace(contact, load=partial(np.interp, xp=time, fp=load))
 
-    motion = time_steps.slides.follow(
-        contact, time, task.slide, task.frames, task.say, task.progress
-    )
+    motion = time_steps.slides.follow(contact, time, slide, frames, task.say, task.progress)
     if motion.n_unsolved:
         raise NotConverged(
             f"in {motion.n_unsolved} time steps of the prescribed slide the friction force has an error "
@@ -395,45 +367,27 @@ def _follow_by_points(task: SlideTask) -> SlideHistories:
             "",
         )
 
-    # Shear stress and local slip of the frames, by what represents the shear of the pieces.
-    local_slip = motion.slip
-    frames = task.frames
-    if contact.point_sets[0].shear is not None or contact.point_sets[0].lower is not None:
-        tau, local = shear.compute_point_fields(patch, contact, motion.snapshots)
-    else:
-        tau, local = _distribute_evenly(task, motion.force, local_slip)
+    def find_stretch(force, load) -> np.ndarray:
+        """Return the stretch [m] of bonds on rigid pieces under forces and loads [N], or under stresses [Pa]."""
+        limit = friction.static * load
+        share = np.divide(force, limit, out=np.zeros_like(force), where=limit > 0)
+        return friction.bond_length * share
 
     # The stretch of bonds on rigid pieces is that of their force, at most one bond length.
-    is_rigid = not model.partial_slip and model.grooves is None
-    if is_rigid and law_has_trait(model.friction.law, "bonds"):
-        length = model.friction.bond_length
-        local_slip = task.slide - np.clip(_find_stretch(task, motion.force, load), -length, length)
-        stretch = _find_stretch(task, tau, task.evaluate_pressure(frames))
-        local = task.slide[frames, None] - stretch
-    work = motion.mean * np.diff(task.slide)
-    ledger = stack_energies(work, motion.stored, motion.losses)
+    is_rigid = has_bonds and not model.partial_slip and model.grooves is None
+    local_slip = motion.slip
+    if is_rigid:
+        length = friction.bond_length
+        local_slip = slide - np.clip(find_stretch(motion.force, load), -length, length)
+
+    # Shear stress and local slip of the frames, by what represents the shear of the pieces.
+    if contact.point_sets[0].shear is None and contact.point_sets[0].lower is None:
+        tau, local = task.distribute_evenly(motion.force, local_slip)
+    else:
+        tau, local = contact_points.compute_point_fields(task.patch, contact, motion.snapshots)
+        if is_rigid:
+            local = slide[frames, None] - find_stretch(tau, task.evaluate_pressure(frames))
+    ledger = stack_energies(motion.mean * np.diff(slide), motion.stored, motion.losses)
     return SlideHistories(
         motion.force, load, local_slip, ledger, tau, local, contact, motion.join_error
     )
-
-
-def _is_timeless(model) -> bool:
-    """Return whether the friction of a bench depends on the order of its samples, but not on their times."""
-    if law_has_trait(model.friction.law, "bonds"):
-        return not model.bonds.has_growth
-    return law_has_trait(model.friction.law, "timeless")
-
-
-def _find_stretch(task: SlideTask, force, load) -> np.ndarray:
-    """Return the elastic stretch [m] of bonds: the bond length times the force relative to the friction limit.
-
-    Parameters
-    ----------
-    task : SlideTask
-        Task whose friction law has the coefficient and the bond length.
-    force, load : (k,) or (k, m) array
-        Friction force and normal load [N] of the interface, or shear and normal stress [Pa] of its nodes.
-    """
-    limit = task.model.friction.static * load
-    share = np.divide(force, limit, out=np.zeros_like(force), where=limit > 0)
-    return task.model.friction.bond_length * share

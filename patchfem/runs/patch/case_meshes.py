@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...mesh.grading import Layout
-from ..refine import NO_LIMIT, Verdict, refine
+from ..refine import NO_LIMIT, refine
 from . import grids, mesh_levels
 from .cases import Batch, CaseMeasures, Cases, MeshFact, make_cases, take_patch
 from .condensed import CondensedPair, condense
@@ -30,6 +30,9 @@ from .values import contact_reaches_steep_end, find_contact_edges
 MAX_GRADED_CONTACTS = 48
 # Largest number of cases whose contacts are searched for before the meshes are chosen
 MAX_SEARCHED_CASES = 256
+# Largest number of contact searches for many cases: the columns of their grids reach the limit in the second search, and
+# further searches hardly move them
+MAX_SEARCHES = 3
 # Largest number of interface nodes of meshes that many cases share; a finer mesh slows down every case
 MAX_SHARED_NODES = 500
 MAX_CHUNK_VALUES = 4_000_000  # numbers of a temporary array of cases, columns and nodes, 32 MB
@@ -178,7 +181,7 @@ class _CaseSolver:
         """Solve the cases on meshes that they share, and those that miss the tolerance on meshes of smaller groups."""
         numbers = np.arange(self.cases.n_cases)
         search = _ContactSearch(self.patch_model, self.cases, numbers)
-        layout, _ = grids.search_layout(self.patch_model, search.find_contacts)
+        layout, _ = grids.search_layout(self.patch_model, search.find_contacts, MAX_SEARCHES)
         groups = [(OpenCases(numbers, search.guess_places(), []), layout)]
         while groups:
             cases, layout = groups.pop()
@@ -220,31 +223,20 @@ class _CaseSolver:
         given : sequence
             Finer meshes if the scene prescribes them.
         """
-        is_automatic = self.patch_model.mesh.is_automatic
-        n_unjudged = grids.MIN_NESTED_MESHES - 1 if is_automatic else len(given)
         max_nodes = MAX_SHARED_NODES if cases.numbers.size > 1 else np.inf
+        nested = mesh_levels.NestedMeshes(self.patch_model, given, max_nodes)
 
-        def press(bodies, before: OpenCases | None) -> OpenCases:
+        def press(bodies, before: mesh_levels.SolvedMeshes | None) -> mesh_levels.SolvedMeshes:
             """Press the cases that the meshes before have left."""
-            before = before or cases
+            before = before.solution if before else cases
             pair = condense(self.patch_model, *bodies, keep_factors=False)
-            return self._press_parts(before, pair, is_judged=len(before.series) >= n_unjudged)
+            n_meshes = len(before.series) + 1
+            done = self._press_parts(before, pair, is_judged=n_meshes >= nested.n_needed)
+            excess = self.batch.excess[done.numbers].max(initial=0.0)
+            return mesh_levels.SolvedMeshes(n_meshes, pair.meshes, excess, done)
 
-        def judge(done: OpenCases, excesses: list[float]) -> Verdict:
-            """Return the next meshes, on which the cases that are left are solved."""
-            n_done = len(done.series)
-            if not is_automatic:
-                return Verdict(np.inf, given[n_done - 1] if n_done <= len(given) else None)
-            finer = grids.halve_cells(done.series[-1].pair.meshes)
-            is_last = finer[0].x.size > max_nodes
-            is_last |= mesh_levels.is_too_expensive(self.patch_model, finer)
-            is_judged = n_done > n_unjudged
-            if not done.numbers.size or (is_judged and is_last):
-                return Verdict(self.batch.excess[done.numbers].max(initial=0.0))
-            return Verdict(np.inf, finer)
-
-        last, _ = refine(press, bodies, judge, NO_LIMIT)
-        return last.numbers
+        last, _ = refine(press, bodies, nested.judge, NO_LIMIT)
+        return last.solution.numbers
 
     def _press_parts(self, before: OpenCases, pair: CondensedPair, *, is_judged: bool) -> OpenCases:
         """Press cases on a mesh, in parts that limit the memory, and return those that go on.

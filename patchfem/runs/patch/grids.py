@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
+from ...mesh.grading import Layout, RowHeights, divide_into_columns, divide_into_rows
 from ...mesh.grid import TensorGrid
 from ...model.patch import PatchModel
 from ...model.pieces import estimate_rounded_length, extend_grid
@@ -167,13 +167,15 @@ class SolvedContact(NamedTuple):
 
 
 def search_layout(
-    patch_model, find_contacts: Callable[[CondensedPair], list[SolvedContact]]
+    patch_model,
+    find_contacts: Callable[[CondensedPair], list[SolvedContact]],
+    max_searches: int = MAX_CONTACT_SEARCHES,
 ) -> tuple[Layout, ContactExtent | None]:
     """Search for the contact regions of patches of equal geometry on grids that are graded towards the previous result.
 
     The contact is solved on a coarse grid, and the columns of the next grid are short at the edges of this
     contact. The search ends when the cells at all edges are short compared to the contact, after
-    MAX_CONTACT_SEARCHES solutions at most.
+    `max_searches` solutions at most.
 
     If a varying load moves the contact edges, the columns are short wherever the edges lie between
     VARYING_LOAD_FACTORS times the load. If wear moves them, no column is longer than
@@ -185,6 +187,8 @@ def search_layout(
         Pieces and mesh settings of all patches.
     find_contacts : callable
         Function of the pieces on a grid that returns the contacts for which the next grid is graded; [] without a load.
+    max_searches : int
+        Largest number of searches.
 
     Returns
     -------
@@ -195,7 +199,7 @@ def search_layout(
     """
     layout = make_search_layout(patch_model)
     contact = None
-    for _ in range(MAX_CONTACT_SEARCHES):
+    for _ in range(max_searches):
         pair = condense(patch_model, *make_grids(patch_model, layout), keep_factors=False)
         solved = find_contacts(pair)
 
@@ -304,7 +308,7 @@ def make_search_layout(patch_model) -> Layout:
     """Return the layout of equal columns on which the search for the contact starts."""
     half = patch_model.pieces.length / 2
     cell = min(patch_model.pieces.length / N_SEARCH_COLUMNS, _max_wave_cell(patch_model))
-    return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
+    return Layout(-half, half, (), cell, 0.0)
 
 
 def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
@@ -324,7 +328,7 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     max_cell = min(length / 12, 4 * _max_wave_cell(patch_model))
 
     if max(len(extent.places) for extent in extents) > MAX_GRADED_CONTACT_ENDS:
-        return Layout(-half, half, (), span, *(2 * [min(length / 64, max_cell)]), 0.0)
+        return Layout(-half, half, (), min(length / 64, max_cell), 0.0)
     if mesh.edge_motion == "wear":
         max_cell = min(max_cell, length * MAX_WEAR_CELL_LENGTH_RATIO)
     max_loaded_cell = min(width / 6, length / 24, max_cell)
@@ -379,35 +383,21 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     bands += _make_point_bands(sorted(ends), corner_cell)
     # The stresses are singular at the far corners, where a free side meets the holder.
     bands += _make_point_bands((-half, half), min(patch_model.pieces.height, length) / 20)
-    return Layout(
-        -half,
-        half,
-        tuple(bands),
-        span,
-        max(max_loaded_cell, min_cell),
-        max_cell,
-        density.cell_growth,
-    )
+    bands.append((*span, max(max_loaded_cell, min_cell)))
+    return Layout(-half, half, tuple(bands), max_cell, density.cell_growth)
 
 
 def _merge_layouts(layouts: list[Layout]) -> Layout:
     """Merge column layouts of several loads or cases, taking the shortest cell of all of them at each position."""
     if len(layouts) == 1:
         return layouts[0]
-    bands = set()
-    for layout in layouts:
-        bands.update(layout.bands, [(*layout.span, layout.max_loaded_length)])
-
-    first = layouts[0]
+    bands = set(chain.from_iterable(layout.bands for layout in layouts))
     bands = sorted(bands, key=lambda band: (band[2], band))
-    merged = Layout(
-        first.start,
-        first.stop,
-        (),
-        (first.start, first.stop),
-        *2 * [min(layout.max_length for layout in layouts)],
-        min(layout.slope for layout in layouts),
-    )
+    max_length = min(layout.max_length for layout in layouts)
+    slope = min(layout.slope for layout in layouts)
+    merged = replace(layouts[0], bands=(), max_length=max_length, slope=slope)
+    if not bands:
+        return merged
 
     low, high, _ = np.array(bands).T
     positions = np.linspace(low, high, 5, axis=1)
@@ -545,14 +535,14 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     for piece in pieces[:1] if patch_model.pieces.are_alike else pieces:
         # The height of a row is at most a tenth of the length, or 1/24 of the height of a tall
         # piece, and never more than 1/6 of the height.
-        rows = divide_piece_into_rows(
-            piece,
-            first_row=first_row,
-            last_row=min(piece.height, length) / 60,
-            coating_row=piece.thickness / 4,
-            max_row=min(max(length / 10, piece.height / 24), piece.height / 6),
+        rows = RowHeights(
+            first=first_row,
+            last=min(piece.height, length) / 60,
+            coating=max(piece.thickness / 4, first_row),
+            largest=min(max(length / 10, piece.height / 24), piece.height / 6),
             growth=growth,
         )
+        rows = divide_into_rows(piece.height, piece.thickness, rows)
         grids.append(extend_grid(patch_model, piece, TensorGrid(x, *rows), 1 + growth))
     return grids
 
@@ -563,32 +553,6 @@ def halve_cells(bodies, count: int = 1) -> list:
     for _ in range(count):
         bodies = [body.refine() for body in bodies]
     return bodies
-
-
-def divide_piece_into_rows(
-    piece, first_row: float, last_row: float, coating_row: float, max_row: float, growth: float
-) -> tuple[np.ndarray, int]:
-    """Return the depths [m] of the element rows of a piece and the number of rows in the coating.
-
-    Parameters
-    ----------
-    piece : PatchPiece
-        Piece with its height and the thickness of its coating.
-    first_row, last_row, coating_row : float
-        Heights [m] of the rows at the interface, at the holder, and at the inner face of the coating, where they are at
-        least `first_row`.
-    max_row : float
-        Largest height of a row [m].
-    growth : float
-        Growth of the height with the distance from these places [1].
-    """
-    height = piece.height
-    coating = piece.thickness
-    bands = [(0.0, 0.0, first_row), (height, height, last_row)]
-    if coating:
-        bands.append((coating, coating, max(coating_row, first_row)))
-    rows = Layout(0.0, height, tuple(bands), (0.0, height), max_row, max_row, growth)
-    return divide_into_rows(rows, coating)
 
 
 def predict_condensing_seconds(bodies) -> float:

@@ -2,11 +2,13 @@
 
 In: a `PatchModel` and a tolerance. Out: solved patches from fine to coarse. A mesh that the scene
 does not prescribe is refined until the static measures meet the tolerance or the next mesh is too
-expensive (`solve_on_refined_meshes`).
+expensive (`NestedMeshes`); the meshes of many patches (`case_meshes`) are refined in the same way.
 """
 
+from collections.abc import Sequence
 from functools import partial
 from math import inf
+from typing import Any, NamedTuple
 
 from ...core import NotConverged, Outcome, PatchfemError
 from ...mesh import pieces as piece_meshes
@@ -64,7 +66,6 @@ def solve_with_coarser(
         Patches from fine to coarse, at least two; None for each mesh that is not solved. The first
         has the static measures with the errors that follow from all of them (`Patch.measures`).
     """
-    mesh = patch_model.mesh
 
     def solve() -> Patches:
         """Solve the patch on its own meshes or on those that the scene prescribes."""
@@ -72,43 +73,11 @@ def solve_with_coarser(
             return solved or area.solve_face_on_grids(
                 patch_model, tolerance, with_errors=with_errors
             )
-        if mesh.is_automatic:
-            return solve_on_refined_meshes(patch_model, tolerance, with_errors, solved)
-        # Only the finest mesh needs factors, for the stress inside the pieces. The patches of many rigs do not keep them.
-        levels = make_given_meshes(patch_model)[: None if with_errors else 1]
-        pairs = [
-            condense(patch_model, *level, keep_factors=mesh.is_fine and level is levels[0])
-            for level in levels
-        ]
-        return solve_on_pairs(patch_model, pairs, tolerance)
+        return _PatchMeshes(patch_model, tolerance, solved, with_errors=with_errors).solve()
 
     # Many runs of a rig or of a bench have the same patch. That of a bench has large factors, so that only one stays.
     key = ("patches", store.content_key(patch_model), tolerance, with_errors)
-    return store.get_or_compute(key, solve, is_large=mesh.is_fine)
-
-
-def solve_on_pairs(patch_model, pairs, tolerance: float) -> Patches:
-    """Solve a patch on given condensed pieces.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch to solve.
-    pairs : sequence of CondensedPair
-        From fine to coarse.
-    tolerance : float
-        Relative error; measures that miss it are extrapolated if the mesh is automatic.
-
-    Returns
-    -------
-    tuple
-        Patches as in `solve_with_coarser`.
-    """
-    patches = []
-    for pair in reversed(pairs):
-        coarse = patches[0] if patches else None
-        patches.insert(0, solve_patch_contact(patch_model, pair, coarse=coarse))
-    return with_static_measures((*patches, *(3 - len(patches)) * [None]), tolerance)
+    return store.get_or_compute(key, solve, is_large=patch_model.mesh.is_fine)
 
 
 def make_given_meshes(patch_model) -> "list[tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]]":
@@ -152,7 +121,7 @@ def solve_on_other_mesh(patch: Patch, tolerance: float) -> Patch:
     if n_columns < MAX_COLUMNS_WITHOUT_COARSER:
         raise PatchfemError(f"the mesh has only {n_columns} columns; use smaller elements", "")
     pair = condense(patch.model, *_change_elements(patch.pair.meshes))
-    return solve_on_pairs(patch.model, [pair], tolerance)[0]
+    return with_static_measures([solve_patch_contact(patch.model, pair)], tolerance)[0]
 
 
 def condense_for_contacts(patch_models) -> CondensedPair | None:
@@ -171,53 +140,67 @@ def condense_for_contacts(patch_models) -> CondensedPair | None:
     return condense(first, *halve_cells(make_grids(first, layout), MIN_NESTED_MESHES - 1))
 
 
-def solve_on_refined_meshes(
-    patch_model, tolerance: float, with_errors: bool = True, solved: Patches = ()
-) -> Patches:
-    """Solve a patch on successively finer meshes until it meets the tolerance.
+class SolvedMeshes(NamedTuple):
+    """Solution of one or many patches on nested meshes.
 
-    At least MIN_NESTED_MESHES meshes are solved, because the error follows from the changes between them. Each
-    mesh halves the cells of the previous one. The refinement ends if the next mesh would exceed the CPU
-    time that is allowed for a patch. If the next mesh of a patch with a profile is expensive, the
-    measures are computed on points as dense as the profile, and the mesh only serves fields and motion.
-    `PatchMesh.n_finer` more meshes follow.
+    - n_meshes: number of meshes.
+    - meshes: those of both pieces on the finest level.
+    - excess: largest ratio of error to allowed error of the patches that go on.
+    - solution: solution on all meshes.
+    """
+
+    n_meshes: int
+    meshes: "Sequence[piece_meshes.Mesh | None]"
+    excess: float
+    solution: Any
+
+
+class NestedMeshes:
+    """Nested meshes of one or many patches, which `refine` halves until the patches meet their tolerance.
+
+    At least MIN_NESTED_MESHES meshes are solved, because the error follows from the changes between them. The refinement
+    ends if the next mesh would exceed the CPU time that is allowed for a patch. `PatchMesh.n_finer` more meshes follow.
 
     Parameters
     ----------
     patch_model : PatchModel
-        Patch to solve, without a prescribed element size.
-    tolerance : float
-        Relative error that the static measures have to meet.
-    with_errors : bool
-        If False, only the third mesh is solved.
-    solved : tuple
-        Patches of an earlier pass, from fine to coarse, which are not solved again.
-
-    Returns
-    -------
-    tuple
-        Patches on all meshes, from fine to coarse. The first has the static measures of the last
-        turn of the refinement (`Patch.measures`), by which the refinement ended.
+        Patch, or one of the patches with the same pieces.
+    given : sequence
+        Finer meshes if the scene prescribes them.
+    max_nodes : float
+        Largest number of interface nodes.
     """
-    solved = tuple(patch for patch in solved if patch is not None)
-    if solved:
-        bodies = [mesh for mesh in solved[-1].pair.meshes if mesh is not None]
-    else:
-        bodies = make_base_grids(patch_model).bodies
-    meshes = _PatchMeshes(patch_model, tolerance, solved)
-    if with_errors or solved:
-        patches, _ = refine(meshes.press, bodies, meshes.judge, NO_LIMIT)
-    else:
-        bodies = halve_cells(bodies, MIN_NESTED_MESHES - 1)
-        patches = (meshes.solve(bodies, None, keep_factors=True),)
-    if len(patches) < MIN_NESTED_MESHES:
-        missing = (MIN_NESTED_MESHES - len(patches)) * [None]
-        return with_static_measures((*patches, *missing), tolerance)
-    return patches
+
+    def __init__(self, patch_model, given=(), max_nodes: float = inf):
+        self.patch_model = patch_model
+        self.given = given
+        self.max_nodes = max_nodes
+        self.n_finer = patch_model.mesh.n_finer
+        is_automatic = patch_model.mesh.is_automatic
+        self.n_needed = MIN_NESTED_MESHES if is_automatic else 1 + len(given)
+
+    def judge(self, done: SolvedMeshes, excesses: list[float]) -> Verdict:
+        """Decide whether a finer mesh follows; `excesses` are those of the meshes before."""
+        if not self.patch_model.mesh.is_automatic:
+            finer = self.given[done.n_meshes - 1 :][:1]
+            return Verdict(done.excess, *finer)
+        finer = halve_cells(done.meshes)
+        is_last = done.excess <= 1
+        if done.n_meshes >= self.n_needed:
+            is_last |= finer[0].x.size > self.max_nodes
+            is_last = is_last or is_too_expensive(self.patch_model, finer)
+        if is_last:
+            if self.n_finer == 0:
+                return Verdict(done.excess)
+            self.n_finer -= 1
+        return Verdict(done.excess, finer)
 
 
-class _PatchMeshes:
-    """Meshes of a single patch, for which `refine` is called.
+class _PatchMeshes(NestedMeshes):
+    """Nested meshes of a single patch, of which the solution on each mesh is kept.
+
+    If the next mesh of a patch with a profile is expensive, the measures are computed on points as dense as the profile, and
+    the mesh only serves fields and motion.
 
     Parameters
     ----------
@@ -226,63 +209,84 @@ class _PatchMeshes:
     tolerance : float
         Relative error that the static measures have to meet.
     solved : tuple of Patch
-        Patches of an earlier pass, from fine to coarse.
+        Patches of an earlier pass, from fine to coarse, which are not solved again.
+    with_errors : bool
+        Whether the patch is solved on coarser meshes, too, from which its errors follow.
     """
 
-    def __init__(self, patch_model, tolerance: float, solved: Patches):
-        self.patch_model = patch_model
+    def __init__(self, patch_model, tolerance: float, solved: Patches, *, with_errors: bool):
+        levels = ()
+        if not patch_model.mesh.is_automatic:
+            levels = make_given_meshes(patch_model)[: None if with_errors else 1]
+        super().__init__(patch_model, levels[-2::-1])
         self.tolerance = tolerance
-        self.solved = solved
-        self.n_finer = patch_model.mesh.n_finer
+        self.solved = tuple(patch for patch in solved if patch is not None)
         self.points = None
         self.has_tried_points = False
-        self.is_done = False
 
-    def press(self, bodies, patches: Patches | None) -> Patches | None:
-        """Solve the patch on meshes, and estimate the errors of its measures from those before; None if this fails.
+        # The coarsest meshes
+        if levels:
+            self.bodies = levels[-1]
+        elif self.solved:
+            self.bodies = [mesh for mesh in self.solved[-1].pair.meshes if mesh is not None]
+        else:
+            self.bodies = make_base_grids(patch_model).bodies
+            if not with_errors:
+                self.bodies = halve_cells(self.bodies, MIN_NESTED_MESHES - 1)
+                self.n_needed = 1
 
-        `patches` are those on the meshes before, from fine to coarse.
+    def solve(self) -> Patches:
+        """Return the patch on all meshes, from fine to coarse.
+
+        The first patch has the static measures by which the refinement ended (`Patch.measures`).
         """
-        patches = patches or ()
+        done, _ = refine(self.press, self.bodies, self.judge, NO_LIMIT)
+        patches = done.solution
+        if len(patches) < MIN_NESTED_MESHES:
+            missing = (MIN_NESTED_MESHES - len(patches)) * [None]
+            patches = with_static_measures((*patches, *missing), self.tolerance)
+        return patches
+
+    def press(self, bodies, before: SolvedMeshes | None) -> SolvedMeshes | None:
+        """Solve the patch on meshes, and estimate the errors of its measures from those before; None if this fails."""
+        patches = before.solution if before else ()
         coarse = patches[0] if patches else None
         if len(patches) < len(self.solved):
             patch = self.solved[-1 - len(patches)]
         else:
-            # Only the last mesh needs factors
+            # Only the last mesh needs factors, for the stress inside the pieces, which is computed on a coarser mesh if this
+            # one is expensive. The patches of many rigs do not keep them.
             if coarse is not None:
                 coarse.pair.forget_factors()
-            is_judged = len(patches) >= MIN_NESTED_MESHES - 1
+            has_factors = self.patch_model.mesh.is_fine and len(patches) + 1 >= self.n_needed
+            has_factors &= not is_too_expensive(self.patch_model, bodies)
+            pair = condense(self.patch_model, *bodies, keep_factors=has_factors)
             try:
-                patch = self.solve(bodies, coarse, keep_factors=is_judged)
+                patch = solve_patch_contact(self.patch_model, pair, coarse=coarse)
             # The cells are too short for double precision, so that the finest mesh is left out.
             except NotConverged:
                 if coarse is None:
                     raise
                 return None
         patches = (patch, *patches)
-        if len(patches) < MIN_NESTED_MESHES:
-            return patches
+        excess = inf if len(patches) < self.n_needed else 0.0
+        if len(patches) >= MIN_NESTED_MESHES:
+            patches, excess = self._judge_measures(patches)
+        return SolvedMeshes(len(patches), patch.pair.meshes, excess, patches)
 
+    def _judge_measures(self, patches: Patches) -> tuple[Patches, float]:
+        """Return the patches with measures, and the largest ratio of error to allowed error that a finer mesh reduces."""
         # The solution on the points of a profile is used with all finer meshes.
         patches = with_static_measures(patches, self.tolerance, self.points)
-        self.is_done = max_mesh_error_ratio(patches[0].measures, self.tolerance) <= 1
-        if not (self.is_done or self.has_tried_points):
+        if patches[0].pressure.outcome is Outcome.NO_CONTACT:
+            return patches, 0.0
+        excess = max_mesh_error_ratio(patches[0].measures, self.tolerance)
+        if excess > 1 and not self.has_tried_points:
             patches = self._use_points(patches)
+            excess = max_mesh_error_ratio(patches[0].measures, self.tolerance)
         # The points do not determine a peak that may be at a free corner, but a finer mesh does.
-        points = self.points
-        self.is_done |= points is not None and "pressure_peak" in points.measures
-        return patches
-
-    def solve(self, bodies, coarse: Patch | None, *, keep_factors: bool) -> Patch:
-        """Solve the patch on meshes; `coarse` is the patch on the meshes before, with whose contact the search starts.
-
-        Factors serve the stress inside the pieces, which is computed on a coarser mesh if this one is expensive. The patches
-        of many rigs do not keep them.
-        """
-        keep_factors &= self.patch_model.mesh.is_fine
-        keep_factors &= not is_too_expensive(self.patch_model, bodies)
-        pair = condense(self.patch_model, *bodies, keep_factors=keep_factors)
-        return solve_patch_contact(self.patch_model, pair, coarse=coarse)
+        has_peak = self.points is not None and "pressure_peak" in self.points.measures
+        return patches, 0.0 if has_peak else excess
 
     def _use_points(self, patches: Patches) -> Patches:
         """Return the patches with measures on the points of a profile, if the next mesh would take long.
@@ -294,8 +298,7 @@ class _PatchMeshes:
         is_expensive = (
             predict_condensing_seconds(finer) > COARSE_GRID_DENSITY.max_condensing_seconds
         )
-        has_load = patches[0].pressure.outcome is not Outcome.NO_CONTACT
-        if not (is_expensive and has_load and profile_points.can_use_points(self.patch_model)):
+        if not (is_expensive and profile_points.can_use_points(self.patch_model)):
             return patches
         self.has_tried_points = True
         self.points = self.solved[0].points if self.solved else None
@@ -303,20 +306,6 @@ class _PatchMeshes:
             meets_tolerance = partial(_meets_tolerance, patches, self.tolerance)
             self.points = profile_points.solve_on_points(self.patch_model, meets_tolerance)
         return with_static_measures(patches, self.tolerance, self.points)
-
-    def judge(self, patches: Patches, excesses) -> Verdict:
-        """Decide whether a finer mesh follows; `patches` are solved, and `excesses` those of the meshes before."""
-        finer = halve_cells(patches[0].pair.meshes)
-        if len(patches) < MIN_NESTED_MESHES:
-            return Verdict(inf, finer)
-        if patches[0].pressure.outcome is Outcome.NO_CONTACT:
-            return Verdict(0.0)
-        excess = max_mesh_error_ratio(patches[0].measures, self.tolerance)
-        if self.is_done or is_too_expensive(self.patch_model, finer):
-            if self.n_finer == 0:
-                return Verdict(excess)
-            self.n_finer -= 1
-        return Verdict(excess, finer)
 
 
 def _meets_tolerance(patches: Patches, tolerance: float, points) -> bool:

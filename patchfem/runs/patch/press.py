@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...contact.press import PatchState, press_patch
-from ...contact.press_cases import press_on_table
+from ...contact.press import SmoothLayer, press, press_patch
 from ...contact.set_table import SetTable
 from ...core import Compliance, ContactState, Outcome, PatchfemError, frozen_array
 from ...elasticity.lapack import use_one_blas_thread
@@ -103,6 +102,14 @@ class Level:
             return self.tangent
         return 1 / (self.model.interface.skin.normal_stiffness * self.area)
 
+    @property
+    def smooth_layer(self) -> SmoothLayer | None:
+        """Smooth asperity layer, whose law may depend on the load; None without such a layer."""
+        if not self.is_smooth or self.tangent is not None:
+            return None
+        area = self.area.sum()
+        return SmoothLayer(self.area, lambda load: make_skin_law(self.model, load / area))
+
     def linearise(self, tangent: np.ndarray) -> "Level":
         """Return the pieces with a smooth asperity layer of a tangent compliance (m,) [m/N], without gap shapes."""
         return Level(self.model, self.pair, self.shapes[:0], tangent)
@@ -132,7 +139,7 @@ class Level:
         """Contact sets of the normal compliance, for all columns, and of the shear compliance, for a unit slide.
 
         The shear compliance of unlike pieces contains the normal one and the coupling of both, and the slide is that at
-        fixed approach. A smooth layer has no tables, because its tangent differs between the cases (`linearise`).
+        fixed approach. A smooth layer is not part of them, because its tangent differs between the cases (`linearise`).
         """
         size = self.x.size
         normal = self.pieces.normal
@@ -524,52 +531,21 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
 
     The parameters and results are those of `press_on_level`.
     """
-    holders = cases.holders
-    unloaded_gap = cases.amplitudes @ level.shapes
-    force = np.zeros(unloaded_gap.shape)
-    gap = unloaded_gap.copy()
+    states = press(level.tables[0], cases.holders, cases.amplitudes, start, level.smooth_layer)
     layer = None
-    if level.has_layer:
-        own = 1.0 if level.is_smooth else level.linear_layer
-        layer = np.broadcast_to(own, force.shape).copy()
-    approach = np.zeros(cases.n_cases)
-    turn = np.zeros(cases.n_cases)
-    alone = np.arange(cases.n_cases)
+    if level.is_smooth:
+        # The law is linearised; the compliance of unloaded nodes is limited
+        stiffness = np.maximum(states.layer_stiffness * level.area, 1e-300)
+        largest = stiffness.max(axis=1, keepdims=True)
+        layer = 1 / np.maximum(stiffness, edges.MIN_CONTACT_PRESSURE_RATIO * largest)
+    elif level.has_layer:
+        layer = np.broadcast_to(level.linear_layer, states.force.shape)
 
-    if not level.is_smooth:
-        table = level.tables[0]
-        sets = press_on_table(table, holders, cases.amplitudes, start)
-        is_solved = sets.is_solved & holders.are_computable(unloaded_gap.min(axis=1))
-        solved = np.flatnonzero(is_solved)
-        slots = sets.slot[solved]
-        unknown = table.combine(slots, sets.closing[solved])
-        active = table.active[slots]
-        force[solved] = np.where(active, unknown, 0.0)
-        gap[solved] = np.where(active, 0.0, np.maximum(unknown, 0.0))
-        approach[solved] = sets.closing[solved, 0]
-        turn[solved] = -sets.closing[solved, 1]
-        alone = np.flatnonzero(~is_solved)
-
-    errors = {}
-    for case in alone:
-        try:
-            holder = holders.take(case)
-            law = None
-            if level.is_smooth:
-                law = make_skin_law(level.model, holder.load / level.area.sum())
-            state = press_patch(level.pieces, unloaded_gap[case], holder, law)
-        except PatchfemError as error:
-            errors[int(case)] = error
-            continue
-        force[case] = state.force
-        gap[case] = state.gap
-        approach[case] = state.approach
-        turn[case] = state.turn
-        if layer is not None:
-            layer[case] = compute_layer_compliance(level, state)
-
-    positions = HolderPositions(approach, cases.rotation + turn, turn, holders.can_rotate)
-    return PressedCases(level, force, gap, unloaded_gap, positions, layer), errors
+    positions = HolderPositions(
+        states.approach, cases.rotation + states.turn, states.turn, cases.holders.can_rotate
+    )
+    gap = cases.amplitudes @ level.shapes
+    return PressedCases(level, states.force, states.gap, gap, positions, layer), states.errors
 
 
 def make_contact_force_function(patch_model, pair: CondensedPair):
@@ -588,9 +564,7 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
     level = Level(patch_model, pair, np.zeros((0, x.size)))
     pieces = level.pieces
     holder = make_cases(patch_model, 1).holders.take(0)
-    law = None
-    if level.is_smooth:
-        law = make_skin_law(patch_model, holder.load / level.area.sum())
+    law = level.smooth_layer and level.smooth_layer.make_law(holder.load)
     active = None
 
     def compute_forces(worn, softening) -> np.ndarray:
@@ -604,14 +578,3 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
         return force
 
     return compute_forces
-
-
-def compute_layer_compliance(level: Level, state: PatchState) -> np.ndarray:
-    """Return the compliance (m,) [m/N] of the asperity layer of a level at the nodes of a contact state.
-
-    A nonlinear law is linearised; the compliance of unloaded nodes is limited.
-    """
-    if not level.is_smooth:
-        return level.linear_layer
-    stiffness = np.maximum(state.layer_stiffness * level.area, 1e-300)
-    return 1 / np.maximum(stiffness, edges.MIN_CONTACT_PRESSURE_RATIO * stiffness.max())

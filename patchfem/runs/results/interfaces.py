@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Outcome, add_interface_number
+from ...core import Outcome, add_interface_number, max_abs
 from ...effects import law_has_trait
 from ...formatting import format_length
 from .result import Finding, patch_surface
@@ -144,7 +144,7 @@ MAX_SLIDE_TO_LENGTH_RATIO = 0.1
 
 def find_max_displacement(slide) -> float:
     """Return the largest |displacement| [m] of samples (k,); inf if the motion overflowed."""
-    largest = float(np.abs(slide).max(initial=0.0))
+    largest = max_abs(slide)
     return largest if np.isfinite(largest) else np.inf
 
 

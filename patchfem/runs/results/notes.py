@@ -10,7 +10,7 @@ from math import ceil, log2
 import numpy as np
 
 from ... import friction
-from ...core import Outcome
+from ...core import Outcome, max_abs
 from ...effects import law_has_trait
 from ...formatting import format_length, format_quantity
 
@@ -49,7 +49,7 @@ def _warn_of_slow_forming(run) -> Iterator[str]:
     law = find_bonds(run.model)
     if law is None or law.reading != "report":
         return
-    speed = float(np.abs(run.solution.window.slide_rate).max())
+    speed = max_abs(run.solution.run.window.slide_rate)
     ratio = friction.bonds.parameters.growth_path_ratio(law, speed)
     if ratio > MAX_BOND_FORMING_SLIP_RATIO:
         # At this growth path, growth_path_ratio(law, speed) equals MAX_BOND_FORMING_SLIP_RATIO.
@@ -85,8 +85,8 @@ def _warn_of_created_energy(run) -> Iterator[str]:
     friction = run.model.friction
     if friction is None or friction.reading != "report":
         return
-    created = run.solution.book.get("created", 0.0)
-    exchanged = run.solution.book.get("passed", 0.0)
+    created = run.solution.run.ledger.get("created", 0.0)
+    exchanged = run.solution.run.ledger.get("passed", 0.0)
     if created > MAX_CREATED_ENERGY_FRACTION * exchanged:
         percent = 100 * created / exchanged
         yield (
@@ -104,7 +104,7 @@ def _warn_of_sudden_slip(run) -> Iterator[str]:
     if law is None or not law.has_growth or not run.model.partial_slip:
         return
     # The samples of a rig are its time steps only in the last cycles.
-    histories = run.solution.response if run.model.rig is None else run.solution.window
+    histories = run.solution.run.response if run.model.rig is None else run.solution.run.window
     slips = np.abs(np.diff(histories.slip))
     slides = np.abs(np.diff(histories.slide))
     is_sudden = slips > np.maximum(law.length, MAX_SLIP_PER_SLIDE * slides)

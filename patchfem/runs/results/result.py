@@ -6,7 +6,7 @@ the numerical settings of the run.
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -14,7 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import response
-from ...core import Outcome, Response, add_interface_number, remove_interface_number
+from ...core import (
+    Measure,
+    Outcome,
+    Response,
+    add_interface_number,
+    array_dataclass,
+    remove_interface_number,
+)
 from ...formatting import rewrite_powers_of_ten
 from ...scene import refuse_attribute
 from . import patch_rows
@@ -84,7 +91,7 @@ class Shortage(NamedTuple):
     key: str = "accuracy.max_seconds"
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class RunInputs:
     """Inputs of a run: plan, pressed interfaces, callbacks and whether to estimate errors.
 
@@ -165,12 +172,14 @@ class SteadyData(NamedTuple):
     - multipliers (m,): Floquet multipliers.
     - residual: change over a period relative to the motion; NaN if unknown.
     - curve: columns of the response curve by name (`steady.curves.tabulate_curve`); None for a single frequency.
+    - width: half-power width of the curve; None for a single frequency, or if the curve is not drawn.
     """
 
     regime: str
     multipliers: np.ndarray
     residual: float = np.nan
     curve: Arrays | None = None
+    width: Measure | None = None
 
 
 class MotionData(NamedTuple):
@@ -209,7 +218,7 @@ class WearHistory(NamedTuple):
     period: float
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class Result:
     """Result of a run: measures, histories, fields, warnings and settings.
 

@@ -9,7 +9,6 @@ lists what each engine can compute, and `runs.plan` the memory of its histories.
 
 Each engine has a module (`march`, `event_to_event` for the engine `hybrid`, `slides` for a bench, and the folder `steady`),
 which prepares the integration in `time_steps` or `hybrid` and contains the measures that the engine computes itself.
-`evaluation` converts a run to a Solution, and continues a run from drive level to drive level. `joints` makes the laws and
-contact models of each engine from the friction of a patch. `bond_lists` has the length of a bond list, and the refusal of
-steps that are too long for it.
+`evaluation` converts a run to a Solution, and `levels` continues a run from drive level to drive level. `joints` makes the
+laws of the engine `hybrid` from the interfaces of a model (`interfaces.joints`).
 """

@@ -25,8 +25,10 @@ from ...response.errors import (
     second_order_errors,
 )
 from ...response.measures import Values
+from ..bench.engine import Numerics
+from ..interfaces import bond_lists
 from ..patch import faces
-from .engines import ENGINES, Numerics, divide_steps, enlarge_hybrid_steps, estimate_hybrid_errors
+from .engines import ENGINES, divide_steps, enlarge_hybrid_steps, estimate_hybrid_errors
 from .evaluation import Solution, first_interface_load
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
@@ -48,14 +50,20 @@ def list_time_runs(numerics: Numerics) -> ComparisonRuns:
     if engine.finds_periodic_motion:
         return []
     if not engine.has_steps:
-        coarse = enlarge_hybrid_steps(numerics)
-        return [CoarserRuns((coarse,), partial(estimate_hybrid_errors, rtol=numerics.local))]
+        rule = partial(estimate_hybrid_errors, rtol=numerics.local)
+        return [CoarserRuns((enlarge_hybrid_steps(numerics),), rule)]
+    rule = partial(estimate_convergence_errors, steps=numerics.steps)
     runs = (divide_steps(numerics, 2), divide_steps(numerics, 4))
-    return [
-        CoarserRuns(
-            runs, partial(estimate_convergence_errors, steps=numerics.steps), source="steps"
-        )
-    ]
+    return [CoarserRuns(runs, rule, source="steps")]
+
+
+def find_bond_summation(model: Model, numerics: Numerics):
+    """Return the EngineChoice by which time steps sum the bonds of a motion; None for other engines and laws."""
+    if model.rig is None or numerics.engine != "march":
+        return numerics.choice
+    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
+    has_bonds = any(law_has_trait(law, "bonds") for law in laws)
+    return bond_lists.choose_bond_summation(model, numerics) if has_bonds else None
 
 
 def list_space_runs(
@@ -77,159 +85,123 @@ def list_space_runs(
         Results of the run.
     """
     engine = ENGINES[numerics.engine]
+    rig = model.rig
     reduction = getattr(solution.contact, "reduction", None)
-    has_modes = hasattr(reduction, "shape")  # parallel elements have none
-    beside = None
-    if engine.has_steps:
-        numerics = beside = divide_steps(numerics, 4)
-
+    # Shear modes of the run; parallel elements have no shape.
+    n_modes = int(np.size(reduction.stiffness)) if hasattr(reduction, "shape") else None
+    beside = divide_steps(numerics, 4) if engine.has_steps else None
+    base = beside or numerics
     coarser_runs = []
-    if engine.finds_periodic_motion:
-        coarser_runs.append(CoarserRuns((), partial(_get_own_errors, solution)))
-    elif not engine.has_steps and model.rig.friction.bands_slide_apart:
+
+    def add(source: str, rule, *changes: dict) -> None:
+        """Add an axis: the rule of its error, and the changes of the settings in its runs."""
+        runs = tuple(replace(base, **change) for change in changes)
+        coarser_runs.append(CoarserRuns(runs, rule, beside if runs else None, source))
+
+    if solution.steady is not None:
+        add("own", solution.steady.get_errors)
+    elif not engine.has_steps and rig.friction.bands_slide_apart:
         # The measures of bands have the error of the trapezoidal rule with 400 samples per cycle.
-        coarser_runs.append(CoarserRuns((), estimate_sampling_errors, source="samples"))
+        add("samples", estimate_sampling_errors)
 
-    # On a coarser mesh the number of shear modes stays, so that only the mesh changes.
-    n_modes = int(np.size(reduction.stiffness)) if has_modes else None
-    coarser_runs += _list_mesh_runs(model, numerics, beside, n_coarse, n_modes)
-    if has_modes:
-        fewer = replace(numerics, shear_modes=slip.shear_modes.comparison_mode_count(n_modes))
-        coarser_runs.append(CoarserRuns((fewer,), second_order_errors, beside, "modes"))
-
-    # The cells of an Iwan model represent its continuous density to order 2.
-    if engine.has_steps and solution.contact is not None and _has_cells(model):
-        halved = replace(numerics, has_half_cells=True)
-        coarser_runs.append(CoarserRuns((halved,), second_order_errors, beside))
-    coarser_runs += _list_bond_sum_runs(model, numerics, patch, solution)
-
-    # A reduced structure neglects its highest modes. One run has more modes, another one half of them.
-    others = () if model.rig is None else model.rig.structure.other_rigs
-    if others:
-        runs = tuple(replace(numerics, other_rig=number) for number in range(len(others)))
-        coarser_runs.append(CoarserRuns(runs, estimate_errors_from_finer, beside, "reduced"))
-    return coarser_runs
-
-
-def _get_own_errors(solution: Solution, values: Values) -> Values:
-    """Return the errors that the solver of a motion knows by measure, 0 for others."""
-    return {name: solution.errors.get(name, 0.0) for name in values}
-
-
-def _has_cells(model: Model) -> bool:
-    """Return whether the law of an interface is represented by cells."""
-    laws = [model.friction]
-    if model.rig is not None:
-        laws = [interface.numbers for interface in model.rig.friction.interfaces]
-    return any(law_has_trait(law.law, "cells") for law in laws)
-
-
-def _list_mesh_runs(
-    model: Model, numerics: Numerics, beside: Numerics | None, n_coarse: int, n_modes: int | None
-) -> ComparisonRuns:
-    """List the comparison runs in which one patch of a model has coarser meshes: that of [contact], or of an interface.
-
-    Interfaces with equal patches are coarsened together. The error is of second order for shear modes, and for an interface
-    that slips as a whole. The order of parallel elements, and of the cells of a face in time steps, is at least 1.
-
-    Parameters
-    ----------
-    model : Model
-        Model of the motion.
-    numerics : Numerics
-        Settings of a comparison run.
-    beside : Numerics or None
-        Settings of the run with which it is compared; None for the run itself.
-    n_coarse : int
-        Number of coarser meshes on which the patch of [contact] is solved.
-    n_modes : int or None
-        Number of shear modes of the run; None without shear modes.
-    """
-    has_cells = model.patch is not None and model.patch.area is not None and beside is not None
+    # The patch of [contact] on coarser meshes, with the same number of shear modes, so that only the mesh changes. The
+    # order of the cells of a face in time steps is at least 1.
     is_averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
-    coarser_runs = []
     if n_coarse and (model.motion_depends_on_mesh or is_averaged):
         has_elements = bool(model.partial_slip) and n_modes is None
         rule = _choose_mesh_rule(model.side, has_elements=has_elements)
+        has_cells = model.patch is not None and model.patch.area is not None and beside is not None
         if has_cells and rule is second_order_errors:
             rule = estimate_convergence_errors
         # A second coarser mesh shows the order. The elements of a rig have one, as those between masses.
-        is_single = rule is second_order_errors or (has_elements and model.rig is not None)
+        is_single = rule is second_order_errors or (has_elements and rig is not None)
         n_meshes = 1 if is_single or beside is None else 2
-        levels = range(1, 1 + min(n_coarse, n_meshes))
         modes = numerics.shear_modes if n_modes is None else n_modes
-        runs = tuple(replace(numerics, coarse_patch=k, shear_modes=modes) for k in levels)
-        coarser_runs.append(CoarserRuns(runs, rule, beside, "mesh"))
-    # The module of interfaces with patches is loaded only for them.
-    groups = faces.group_interfaces_with_coarse_mesh(model) if model.has_interface_patches else []
-    for interfaces in groups:
-        interface = model.rig.friction.interfaces[interfaces[0]]
-        rule = _choose_mesh_rule(
-            interface.patch.gap.side, has_elements=bool(interface.partial_slip) and n_modes is None
-        )
-        coarse = replace(numerics, meshed=interfaces)
-        coarser_runs.append(CoarserRuns((coarse,), rule, beside, "mesh"))
+        levels = range(1, 1 + min(n_coarse, n_meshes))
+        add("mesh", rule, *({"coarse_patch": k, "shear_modes": modes} for k in levels))
+
+    # Interfaces with equal patches are coarsened together. The module of these patches is loaded only for them.
+    for numbers in (
+        faces.group_interfaces_with_coarse_mesh(model) if model.has_interface_patches else ()
+    ):
+        interface = rig.friction.interfaces[numbers[0]]
+        has_elements = bool(interface.partial_slip) and n_modes is None
+        rule = _choose_mesh_rule(interface.patch.gap.side, has_elements=has_elements)
+        add("mesh", rule, {"meshed": numbers})
+    if n_modes is not None:
+        fewer = slip.shear_modes.comparison_mode_count(n_modes)
+        add("modes", second_order_errors, {"shear_modes": fewer})
+
+    # The cells of an Iwan model represent its continuous density to order 2.
+    laws = [model.friction]
+    if rig is not None:
+        laws = [interface.numbers for interface in rig.friction.interfaces]
+    has_cells = any(law_has_trait(law.law, "cells") for law in laws)
+    if engine.has_steps and solution.contact is not None and has_cells:
+        add("own", second_order_errors, {"has_half_cells": True})
+
+    # Bonds: the bound of the sum, and if strips or the tail are coarse, the change of the motion with finer ones.
+    choice = find_bond_summation(model, numerics)
+    ledger = solution.run.ledger
+    if choice is not None and choice.find_error(ledger.get("join_error", 0.0)):
+        add("bonds", partial(_bound_bond_errors, model, patch, solution, choice))
+        if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
+            finer = replace(
+                choice,
+                merge=COMPARISON_MERGE_WIDTH_FACTOR * choice.merge,
+                tail=COMPARISON_TAIL_FACTOR * choice.tail,
+            )
+            narrow = replace(base, choice=finer)
+            same = replace(base, choice=choice)
+            coarser_runs.append(CoarserRuns((narrow,), estimate_errors_from_finer, same, "bonds"))
+
+    # A reduced structure neglects its highest modes. One run has more modes, another one half of them.
+    others = () if rig is None else rig.structure.other_rigs
+    if others:
+        numbers = ({"other_rig": number} for number in range(len(others)))
+        add("reduced", estimate_errors_from_finer, *numbers)
     return coarser_runs
 
 
 def _choose_mesh_rule(side: str, *, has_elements: bool):
-    """Return the rule of the error by the mesh of an interface, whose piece on a `side` has the pressure."""
+    """Return the rule of the error by the mesh of an interface, whose piece on a `side` has the pressure.
+
+    The error is of second order for shear modes, and for an interface that slips as a whole. The order of parallel
+    elements is at least 1.
+    """
     if side == "lower":
         return edge_errors
     return estimate_convergence_errors if has_elements else second_order_errors
 
 
-def _list_bond_sum_runs(
-    model: Model, beside: Numerics, patch, solution: Solution
-) -> ComparisonRuns:
-    """List the comparison runs from which the error of a bond list is estimated.
+def _bound_bond_errors(model: Model, patch, solution: Solution, choice, values: Values) -> Values:
+    """Return a bound of the error of each measure due to bonds that the sum leaves out or merges.
 
-    The first entry is the error bound of the sum on forces and energies. If bonds are merged or a
-    large tail is neglected, the second entry is the change of the motion with narrower strips and a
-    smaller tail.
+    The bound follows from the relative error of the force and from the friction work of the run.
 
     Parameters
     ----------
     model : Model
         Model of the motion.
-    beside : Numerics
-        Settings of these runs, with a quarter of the steps of the run.
     patch : Patch or None
         Solved patch.
     solution : Solution
         Results of the run.
+    choice : EngineChoice
+        Method of the sum.
+    values : dict
+        Measures by name.
     """
-    choice = solution.bond_summation
-    error = 0.0 if choice is None else choice.find_error(solution.book.get("join_error", 0.0))
-    if not error:
-        return []
-
-    def bound_errors(values: Values) -> Values:
-        """Return a bound of the error of each measure in `values` due to bonds that the sum leaves out or merges.
-
-        The bound follows from the relative error of the force and from the friction work of the run.
-        """
-        window = solution.window
-        cycle_work = np.abs(np.diff(window.extra["ledger"][0])).sum()
-        if model.rig is not None:
-            span = max(window.time[-1] - window.time[0], 1e-300)
-            cycle_work *= model.rig.drive.signal.period / span
-        load = solution.book.get("peak_load", first_interface_load(model, patch))
-        works = (solution.book["passed"], cycle_work)
-        return compute_friction_errors(values, error, model.friction, load, works)
-
-    # The change of the motion adds to the bound where strips or the tail are coarse.
-    coarser_runs = [CoarserRuns((), bound_errors, source="bonds")]
-    if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
-        finer = replace(
-            choice,
-            merge=COMPARISON_MERGE_WIDTH_FACTOR * choice.merge,
-            tail=COMPARISON_TAIL_FACTOR * choice.tail,
-        )
-        narrow = replace(beside, choice=finer)
-        same = replace(beside, choice=choice)
-        coarser_runs.append(CoarserRuns((narrow,), estimate_errors_from_finer, same, "bonds"))
-    return coarser_runs
+    ledger = solution.run.ledger
+    window = solution.run.window
+    cycle_work = np.abs(np.diff(window.extra["ledger"][0])).sum()
+    if model.rig is not None:
+        span = max(window.time[-1] - window.time[0], 1e-300)
+        cycle_work *= model.rig.drive.signal.period / span
+    load = ledger.get("peak_load", first_interface_load(model, patch))
+    error = choice.find_error(ledger.get("join_error", 0.0))
+    works = (ledger["passed"], cycle_work)
+    return compute_friction_errors(values, error, model.friction, load, works)
 
 
 def list_joint_runs(inputs, space_runs: ComparisonRuns) -> ComparisonRuns:

@@ -9,7 +9,6 @@ same amplitudes (`slip.mesh_correction`).
 """
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +23,6 @@ from ...response.decay_curve import (
     locate_reversals,
     make_half_cycles,
 )
-from ...response.errors import ComparisonRuns
 from ...slip.mesh_correction import spread_elements
 from ..patch import faces
 from . import engines, joints
@@ -49,29 +47,23 @@ MAX_POOLED_RATIO = 1.6
 ERROR_TO_CHANGE = 2.0
 
 
-def compute_decay_curve(solution: Solution) -> DecayCurve | None:
+def compute_decay_curve(solution: Solution, coarser) -> DecayCurve | None:
     """Compute the decay curve of a released rig with error estimates; None if it has no points.
 
     The errors are those of the evaluation plus the changes in the coarse runs at the same
     amplitude. They are infinite outside the range of a coarse run. Points with a relative error
-    above MAX_DECAY_POINT_ERROR are removed.
+    above MAX_DECAY_POINT_ERROR are removed. `coarser` are pairs of a coarse run and its reference run, None for this run.
     """
     curve = _measure_decay_curve(solution)
     if not curve.time.size:
         return None
-    curve = _add_coarse_run_errors(curve, solution)
+    for run, beside in coarser:
+        reference = curve if beside is None else _measure_decay_curve(beside)
+        curve = curve.add_change(_measure_decay_curve(run), reference)
     known = (curve.frequency_error <= MAX_DECAY_POINT_ERROR * curve.frequency) & (
         curve.damping_error <= MAX_DECAY_POINT_ERROR * np.abs(curve.damping)
     )
     return curve.select(known) if known.any() else None
-
-
-def _add_coarse_run_errors(curve: DecayCurve, solution: Solution) -> DecayCurve:
-    """Add the differences of the curve in coarse runs, with fewer steps or modes, to the errors of a decay curve."""
-    for run, beside in solution.coarser:
-        reference = curve if beside is None else _measure_decay_curve(beside)
-        curve = curve.add_change(_measure_decay_curve(run), reference)
-    return curve
 
 
 def _measure_decay_curve(run: Solution) -> DecayCurve:
@@ -80,7 +72,7 @@ def _measure_decay_curve(run: Solution) -> DecayCurve:
     After the last slip, the curve is that of the strongest mode of the free vibration, because the
     reversals of a sum of several modes belong to none of them.
     """
-    motion = run.response
+    motion = run.run.response
     mode = run.tail
     reversals = locate_reversals(motion.time, motion.output, motion.output_rate)
     half_cycles = fit_decay_curve(make_half_cycles(*reversals))
@@ -211,7 +203,13 @@ def estimate_mesh_error(fine, coarse, compute, amplitudes) -> np.ndarray:
     best = compute(fine)
     changes = (compute(other) - best for other in coarse)
     by_meshes = sum(convergence_error(change, order=MAX_CONVERGENCE_ORDER) for change in changes)
-    change = np.fmax(np.abs(compute(fine.with_elements(_spread_elements)) - best), by_meshes)
+
+    def spread(stiffness, yields) -> tuple[np.ndarray, np.ndarray]:
+        """Spread elements (e,) at the nodes uniformly over ranges around their yield displacements [m]."""
+        order = np.argsort(yields, kind="stable")
+        return spread_elements(stiffness[order], yields[order])
+
+    change = np.fmax(np.abs(compute(fine.with_elements(spread)) - best), by_meshes)
 
     # Root mean square over the known changes within a ratio of amplitudes
     distance = np.abs(np.subtract.outer(np.log(amplitudes), np.log(amplitudes)))
@@ -221,137 +219,71 @@ def estimate_mesh_error(fine, coarse, compute, amplitudes) -> np.ndarray:
     return np.where(known, ERROR_TO_CHANGE * np.sqrt(squares), np.nan)
 
 
-def _spread_elements(stiffness, yield_displacement) -> tuple[np.ndarray, np.ndarray]:
-    """Spread friction elements at the nodes of a mesh uniformly over ranges around their yield displacements.
+def add_mesh_errors(
+    curve: DecayCurve, model, patches, stiffer=None, *, has_mesh_run: bool
+) -> tuple[DecayCurve, tuple[str, ...]]:
+    """Return a decay curve whose errors include that of the mesh of its patches, and a note if this error is unknown.
 
-    The change that this causes is the mesh error: between two nodes, the yield displacement is not constant. `stiffness`
-    [N/m] and `yield_displacement` [m] (e,) are in any order; returned are those of the spread elements.
-    """
-    order = np.argsort(yield_displacement, kind="stable")
-    return spread_elements(stiffness[order], yield_displacement[order])
-
-
-class DecayMeshErrors(NamedTuple):
-    """Mesh errors of a decay curve.
-
-    - errors (2, k): of frequency [Hz] and damping ratio [1]; 0 where they are unknown.
-    - reason: why they are unknown; "" if they are known.
-    """
-
-    errors: np.ndarray
-    reason: str = ""
-
-
-def estimate_decay_mesh_errors(
-    model, patch, coarse, amplitudes, find_mode, stiffer=None
-) -> DecayMeshErrors:
-    """Estimate the mesh errors of frequency and damping ratio of a mode; they are 0 for patches without partial slip.
+    Below the slip of the first node, two meshes have the same decay, so that static loops give the error (module
+    docstring). It is interpolated where no static motion is found.
 
     Parameters
     ----------
+    curve : DecayCurve
+        Curve of a mode whose interfaces stick at its end.
     model : Model
         Rig with its interfaces.
-    patch, coarse : Patch or None
-        Patch of [contact], and the same on a coarser mesh.
-    amplitudes : (k,)
-        Increasing amplitudes of the output [m]. The errors are interpolated where no static motion
-        is found.
-    find_mode : callable
-        Function of an UndrivenRig that returns the index of the mode.
-    stiffer : joint.FreeRig, optional
-        Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
-    """
-    rig = model.rig
-    unknown = DecayMeshErrors(np.zeros((2, len(amplitudes))))
-    if not (model.partial_slip or rig.friction.has_partial_slip):
-        return unknown
-
-    moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.bands_slide_apart)
-    if any(moves):
-        return unknown._replace(reason=CONTACTS_WITHOUT_STATIC_CURVE[moves.index(True)])
-
-    # Static loops on both meshes differ by what the mesh resolves, unlike decays (module docstring).
-    try:
-        fine = make_laws_on_mesh(model, patch)
-        mode_index = find_mode(fine)
-        error = estimate_mesh_error(
-            fine,
-            make_laws_on_coarse_meshes(model, coarse, stiffer),
-            lambda laws: compute_static_curve(laws, mode_index, amplitudes)[1:3],
-            amplitudes,
-        )
-    except NotConverged as reason:
-        return unknown._replace(reason=str(reason))
-    except PatchfemError:
-        return unknown._replace(reason=UNKNOWN_LOOP_REASON)
-
-    known = np.isfinite(error).all(axis=0)
-    if not known.any():
-        return unknown._replace(reason=NO_STATIC_CURVE_REASON)
-    return DecayMeshErrors(
-        _interpolate_over_amplitude(amplitudes, amplitudes[known], error[:, known])
-    )
-
-
-def _interpolate_over_amplitude(amplitudes, known_amplitudes, rows) -> np.ndarray:
-    """Interpolate rows (r, k) of values linearly in the logarithm of the amplitude.
-
-    `known_amplitudes` (k,) are the increasing ones of the rows, and `amplitudes` (n,) those at which values are wanted,
-    in the same unit.
-    """
-    at = np.log(amplitudes)
-    known = np.log(known_amplitudes)
-    return np.array([np.interp(at, known, row) for row in rows])
-
-
-def estimate_stuck_mode_mesh_errors(
-    amplitude, frequency: float, model, patch, coarse, stiffer=None
-) -> DecayMeshErrors:
-    """Estimate the mesh errors of frequency and damping ratio of a mode with stuck interfaces.
-
-    Parameters
-    ----------
-    amplitude : (k,)
-        Amplitudes of the output [m].
-    frequency : float
-        [Hz].
-    model : Model
-        Rig with its interfaces.
-    patch, coarse : Patch or None
+    patches : sequence of Patch or None
         Patch of [contact], and the same on a coarser mesh.
     stiffer : joint.FreeRig, optional
         Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
+    has_mesh_run : bool
+        Whether the errors of the curve include the change on a coarser mesh.
     """
-    low, high = np.log10([amplitude.min(), amplitude.max()])
+    friction = model.rig.friction
+    if not (model.partial_slip or friction.has_partial_slip):
+        return curve, ()
+    patch, coarse = patches[:2]
+    low, high = np.log10([curve.amplitude.min(), curve.amplitude.max()])
     at = np.logspace(low, high, 2 + int(MESH_AMPLITUDES_PER_DECADE * (high - low)))
-    errors, reason = estimate_decay_mesh_errors(
-        model,
-        patch,
-        coarse,
-        at,
-        lambda laws: _find_nearest_mode(model.rig.modes, laws, frequency),
-        stiffer,
+
+    reason = ""
+    moves = (model.grooves is not None, friction.load_varies, friction.bands_slide_apart)
+    if any(moves):
+        reason = CONTACTS_WITHOUT_STATIC_CURVE[moves.index(True)]
+    else:
+        try:
+            fine = make_laws_on_mesh(model, patch)
+            mode_index = _find_nearest_mode(model.rig.modes, fine, curve.frequency[-1])
+            others = make_laws_on_coarse_meshes(model, coarse, stiffer)
+            errors = estimate_mesh_error(
+                fine, others, lambda laws: compute_static_curve(laws, mode_index, at)[1:3], at
+            )
+            known = np.isfinite(errors).all(axis=0)
+            reason = "" if known.any() else NO_STATIC_CURVE_REASON
+        except NotConverged as error:
+            reason = str(error)
+        except PatchfemError:
+            reason = UNKNOWN_LOOP_REASON
+    if reason:
+        lacks = "no error of the mesh"
+        if has_mesh_run:
+            lacks = (
+                "the change on a coarser mesh, but not the energy that is lost in slip too small "
+                "for either mesh to resolve"
+            )
+        return curve, (f"the errors of the decay curve include {lacks}, because {reason}",)
+
+    # Linear interpolation over the logarithm of the amplitude
+    places = np.log(at)
+    own = np.log(curve.amplitude)
+    errors = [np.interp(places, places[known], row[known]) for row in errors]
+    frequency_error, damping_error = [np.interp(own, places, row) for row in errors]
+    curve = curve._replace(
+        frequency_error=np.fmax(curve.frequency_error, frequency_error),
+        damping_error=np.fmax(curve.damping_error, damping_error),
     )
-    return DecayMeshErrors(_interpolate_over_amplitude(amplitude, at, errors), reason)
-
-
-def describe_unknown_mesh_error(reason: str, coarser_runs: ComparisonRuns) -> str:
-    """Return a sentence on a decay curve whose mesh error is unknown.
-
-    Parameters
-    ----------
-    reason : str
-        Why it is unknown.
-    coarser_runs : list of CoarserRuns
-        Coarser runs in space whose changes are part of the errors.
-    """
-    lacks = "no error of the mesh"
-    if any(kind.source == "mesh" for kind in coarser_runs):
-        lacks = (
-            "the change on a coarser mesh, but not the energy that is lost in slip too small "
-            "for either mesh to resolve"
-        )
-    return f"the errors of the decay curve include {lacks}, because {reason}"
+    return curve, ()
 
 
 def _find_nearest_mode(modes, laws, frequency: float) -> int:

@@ -5,14 +5,14 @@ model, and its `Numerics`, set by the scene or else by the tolerance (`choose_nu
 `scene.rules.methods.ENGINE_SUPPORT` lists what each engine can compute. The memory of each engine is in `runs.plan`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from math import ceil, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from ... import friction, hybrid, structure
+from ... import hybrid, structure
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
 from ...response.errors import compute_absolute_changes
@@ -20,6 +20,7 @@ from ...response.measures import Values
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ..bench import engine as bench_engine
+from ..bench.engine import MIN_RELATIVE_STEP_ERROR, Numerics
 
 
 class Engine(NamedTuple):
@@ -152,50 +153,6 @@ WHOLE_CYCLE_TOL = 1e-6
 N_TRANSIENT_DECAY_TIMES = 3.0
 MIN_SAMPLES_PER_RUN = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
 MAX_MARCH_STEPS_PER_CYCLE = 6400  # Largest automatically chosen number of time steps per cycle.
-MIN_RELATIVE_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
-
-
-@dataclass(frozen=True, slots=True)
-class Numerics:
-    """Numerical settings of a run of a rig.
-
-    - engine: name of the engine.
-    - steps: time steps per cycle; of the engine `hybrid` the smallest number per shortest period of the drive.
-    - cycles, window: number of cycles of the run, and of the window at its end.
-    - shear_modes: number of shear modes; None: set by the tolerance.
-    - choice: method of bond summation; None: set by the tolerance and the steps.
-    - whole: whether the run stores the histories before the window, or draws the response curve beside its peak; coarse runs
-      may omit them.
-    - local: largest relative error per step of the engine `hybrid`.
-    - other_rig: index of the rig with other modes of a reduced structure, or None.
-    - meshed: indices of the interfaces whose patches have a coarser mesh.
-    - coarse_patch: how many times the mesh of the patch of [contact] is coarser by a factor of 2.
-    - stiffer_joint: whether a joint that is subtracted from bolted modes is stiffer by its error.
-    - has_half_cells: whether Iwan models of time steps have half their cells.
-    """
-
-    engine: str
-    steps: int
-    cycles: float
-    window: int
-    shear_modes: int | None
-    choice: "friction.bonds.engines.EngineChoice | None" = None
-    whole: bool = True
-    local: float = 0.0
-    other_rig: int | None = None
-    meshed: tuple[int, ...] = ()
-    coarse_patch: int = 0
-    stiffer_joint: bool = False
-    has_half_cells: bool = False
-
-    def finer(self):
-        """Return finer settings for the next run.
-
-        The engine `hybrid` has a hundredth of the step error, and other engines have twice as many steps.
-        """
-        if self.local:
-            return replace(self, local=max(0.01 * self.local, MIN_RELATIVE_STEP_ERROR))
-        return replace(self, steps=2 * self.steps)
 
 
 def steps_per_cycle(model: Model) -> int:
@@ -206,33 +163,17 @@ def steps_per_cycle(model: Model) -> int:
     if model.accuracy.steps_per_cycle:
         return model.accuracy.steps_per_cycle
     rig = model.rig
-    max_frequency_ratio = max(
+    period = rig.drive.signal.period
+    ratios = [
         structure.drive_sizes.find_max_frequency_ratio(rig.drive.signal),
-        float(rig.structure.frequencies.max()) * rig.drive.signal.period,
-    )
+        float(rig.structure.frequencies.max()) * period,
+    ]
     if model.load_varies:
-        max_frequency_ratio = max(
-            max_frequency_ratio, model.point.frequency * rig.drive.signal.period
-        )
+        ratios.append(model.point.frequency * period)
     # The error is proportional to the square of the step; 400 steps per cycle of the fastest motion
     # give 1e-3.
-    steps = 2 * round(200 * sqrt(1e-3 / model.accuracy.tolerance) * max_frequency_ratio)
+    steps = 2 * round(200 * sqrt(1e-3 / model.accuracy.tolerance) * max(ratios))
     return min(max(steps, 100), MAX_MARCH_STEPS_PER_CYCLE)
-
-
-def make_bench_numerics(model: Model, steps: int, engine: "bench_engine.BenchEngine") -> Numerics:
-    """Return the Numerics of a bench.
-
-    Parameters
-    ----------
-    model : Model
-        Model of the bench.
-    steps : int
-        Steps per cycle.
-    engine : BenchEngine
-        Method of the friction force.
-    """
-    return Numerics(BENCH.name, steps, model.slide.cycles, 1, None, engine.choice)
 
 
 def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
@@ -258,9 +199,7 @@ def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     rig = model.rig
     engine = engine or choose_engine(model)
     if engine is BENCH:
-        steps = bench_engine.steps_per_cycle(model)
-        slide = bench_engine.sample_path(model, steps).slide
-        return make_bench_numerics(model, steps, bench_engine.choose_bench_engine(model, slide))
+        return bench_engine.make_bench_numerics(model, bench_engine.steps_per_cycle(model))
     drive = rig.drive
     cycles = drive.cycles
     window = int(max(1, min(10, (cycles + WHOLE_CYCLE_TOL) // 10)))
@@ -281,19 +220,17 @@ def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     steps = steps_per_cycle(model)
     if not structure.drive_sizes.is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / drive.cycles)))
-    numerics = Numerics(engine.name, steps, drive.cycles, window, accuracy.shear_modes)
-
+    local = 0.0
     if engine is HYBRID:
         # A rig without friction needs few steps. Otherwise the error per step is a small part of the tolerance.
-        is_exact = accuracy.method == "exact" or model.friction is None
+        steps = hybrid.cases.MIN_STEPS
         local = float(np.clip(1e-5 * accuracy.tolerance, MIN_RELATIVE_STEP_ERROR, 1e-8))
-        if is_exact:
+        if accuracy.method == "exact" or model.friction is None:
             local = hybrid.cases.EXACT_RTOL
-        return replace(numerics, local=local, steps=hybrid.cases.MIN_STEPS)
-    if engine is MARCH and accuracy.steps_per_cycle is None:
+    elif engine is MARCH and accuracy.steps_per_cycle is None:
         # The steps are short enough for a unique solution; comparison runs have half and a quarter of them.
-        return replace(numerics, steps=4 * ceil(max(steps, min_unique_steps(model)) / 4))
-    return numerics
+        steps = 4 * ceil(max(steps, min_unique_steps(model)) / 4)
+    return Numerics(engine.name, steps, drive.cycles, window, accuracy.shear_modes, local=local)
 
 
 def min_unique_steps(model: Model) -> int:
@@ -303,19 +240,10 @@ def min_unique_steps(model: Model) -> int:
     k_t = mu_s N/eps_0 and M is the mass that the interface moves.
     """
     f = model.friction
-    modes = model.rig.modes
-    if (
-        f is None
-        or not law_has_trait(f.law, "bonds")
-        or f.slip_growth is None
-        or not f.kinetic
-        or f.kinetic >= f.static
-    ):
+    if f is None or not law_has_trait(f.law, "bonds") or f.slip_growth is None or not f.kinetic:
         return 0
-    load = model.nominal_load
-    stiff = f.static * load / f.bond_length * (f.static / f.kinetic - 1)
-    return 2 * ceil(
-        0.55
-        * model.rig.drive.signal.period
-        * sqrt(stiff * float((modes.slide**2).sum()) / (2 * modes.mass))
-    )
+    modes = model.rig.modes
+    weakening = max(f.static / f.kinetic - 1, 0.0)
+    stiffness = f.static * model.nominal_load / f.bond_length * weakening
+    mobility = float((modes.slide**2).sum()) / modes.mass
+    return 2 * ceil(0.55 * model.rig.drive.signal.period * sqrt(stiffness * mobility / 2))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import compiled
+from ... import friction
 from ...convergence import convergence_error
 from ...core import NotConverged, Outcome, Response
 from ...hybrid import cases
@@ -22,6 +22,7 @@ from ...response.errors import ERROR_MEASURES, compute_absolute_changes
 from ...response.events import (
     SEGMENT_BORDER,
     Events,
+    VibratingMode,
     classify_changes,
     compute_stuck_vibration,
     find_segment_borders,
@@ -33,14 +34,12 @@ from ...response.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
 from ..bench.masing import find_stretches
-from . import bands, engines
+from ..interfaces import bands
+from . import engines
 from .evaluation import (
     EngineRun,
-    Fields,
     RunEvaluator,
-    Solution,
     compute_sampled_loop,
-    compute_sampled_work,
     compute_work_check,
     describe_escape,
     find_travel,
@@ -54,6 +53,9 @@ N_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40  # largest number of these in a cycle by default
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 SAME_SAMPLE_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
+SAME_PLACE_TOL = (
+    1e-6  # distance from a place of a grid of equal distances that is round-off, in distances
+)
 # Groups of measures that are computed in the same way where bands of a face slide apart: those of the motion, of the whole
 # run and of the errors of the solution. The others follow from the averages over the bands.
 BAND_MEASURE_GROUPS = ("curve", "run", "error")
@@ -98,10 +100,8 @@ class ElementSnapshot(NamedTuple):
         return self.faces[0][1]
 
 
-def run_from_event_to_event(
-    model, numerics, patch, n_frames: int = 0, say=None, progress=None
-) -> Solution:
-    """Compute the motion of a rig from event to event, for one drive level after another.
+class LumpedEvaluator(RunEvaluator):
+    """Evaluator that computes runs of the engine `hybrid`, and measures from them.
 
     Parameters
     ----------
@@ -111,30 +111,15 @@ def run_from_event_to_event(
         Step tolerance, cycles and window.
     patch : Patch or None
         None under [normal] or between masses.
-    n_frames : int
-        Number of snapshots of the interface in the last cycle.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction.
-
-    Raises
-    ------
-    NotConverged
-        If a law or a mode is too fast for the engine.
+    joints : Joints, optional
+        Laws of the interfaces; they are made by default.
     """
-    begin = process_time()
-    joints = make_joints(model, numerics, patch)
-    prepare = {"reduce": process_time() - begin}
-    compiled.report_compilation_to(say)
-    return LumpedEvaluator(model, numerics, patch, joints).solve(n_frames, progress, prepare)
 
-
-class LumpedEvaluator(RunEvaluator):
-    """Evaluator that computes runs of the engine `hybrid`, and measures from them."""
-
-    def __init__(self, model, numerics, patch, joints: Joints):
-        super().__init__(model, numerics, patch, joints.contact, joints.stick_tolerance)
-        self.joints = joints
-        self.is_rigid = bool(joints.laws) and all(is_rigid(law.law) for law, _ in joints.laws)
+    def __init__(self, model, numerics, patch, joints: Joints | None = None):
+        begin = process_time()
+        self.joints = joints = joints or make_joints(model, numerics, patch)
+        super().__init__(model, numerics, patch, joints, joints.stick_tolerance)
+        self.prepare = {"reduce": process_time() - begin}
         self.bands_slide_apart = model.rig.friction.bands_slide_apart and self.has_friction
 
     def integrate(
@@ -156,8 +141,10 @@ class LumpedEvaluator(RunEvaluator):
             Callback for the completed fraction.
         """
         run = self.resume(drive, cycles, None if before is None else before.end, n_frames)
-        if not self.model.rig.drive.levels.amplitudes:
-            run = remove_incomplete_cycle(run)
+        count = int(run.cycles_done + 1e-9)
+        if count and not self.model.rig.drive.levels.amplitudes:
+            # The last cycle is not complete.
+            run = replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
         # Measures of the whole run add up from level to level.
         for name in select_names("run"):
             if before is not None and name in before.values:
@@ -180,70 +167,49 @@ class LumpedEvaluator(RunEvaluator):
         n_frames : int
             Number of snapshots of the elements in the last cycle.
         """
-        travel = find_travel(self.model.rig)
-        times = choose_sample_times(self.numerics, drive, cycles, n_frames)
-        motion = self._run(drive, cycles, times.samples, travel, state)
+        rig = self.model.rig
+        numerics = self.numerics
+
+        def advance(cycles: float, samples, travel: float):
+            """Return the motion of the engine.
+
+            Parameters
+            ----------
+            cycles : float
+                Number of cycles of the drive.
+            samples : (k,) array
+                Times of the samples [s].
+            travel : float
+                Output [m] at which the motion ends.
+            """
+            schedule = cases.Schedule(cycles, numerics.window, np.unique(samples), travel)
+            settings = {"rtol": numerics.local, "n_steps": numerics.steps}
+            case = cases.make_rig_case(rig, self.joints.laws, schedule, signal=drive, **settings)
+            return engine.run_case(case, start=state)
+
+        travel = find_travel(rig)
+        times = choose_sample_times(numerics, drive, cycles, n_frames)
+        motion = advance(cycles, times.samples, travel)
 
         # Why the motion ended early, as an outcome or as an error.
         outcome = EARLY_OUTCOME_BY_STATUS.get(motion.status)
         message = ""
-        if outcome is Outcome.LEAVES_GROOVES:
-            message = self.model.grooves.describe_lift(motion.time)
-        elif outcome is not None:
-            message = describe_escape(self.model.rig, travel)
-        elif motion.status != Status.DONE:
+        if outcome is None and motion.status != Status.DONE:
             march = ""
             if not engines.MARCH.find_unsupported_feature(self.model):
                 # Some messages end with a remedy of their own.
                 before = ", or" if ";" in motion.message else ";"
                 march = f'{before} use accuracy.method = "march"'
             raise NotConverged(motion.message + march)
-
         if outcome is not None:
+            message = describe_escape(rig, travel)
+            if outcome is Outcome.LEAVES_GROOVES:
+                message = self.model.grooves.describe_lift(motion.time)
             # Only a run with a known end has the measures and samples of its last cycles.
             cycles = motion.time / drive.period
-            times = choose_sample_times(self.numerics, drive, cycles, 0)
-            motion = self._run(drive, cycles, times.samples, np.inf, state)
-        run = self._make_run(motion, drive, cycles, times, state)
-        return replace(run, outcome=outcome, message=message)
+            times = choose_sample_times(numerics, drive, cycles, 0)
+            motion = advance(cycles, times.samples, np.inf)
 
-    def _run(self, drive, cycles: float, times, travel: float, state: State | None):
-        """Return the `hybrid.runs.Motion` of a drive.
-
-        Parameters
-        ----------
-        drive
-            Acceleration of the base, or force over the modal mass.
-        cycles : float
-            Number of cycles of the drive.
-        times : (k,) array
-            Times of the samples [s].
-        travel : float
-            Largest magnitude of the output [m], at which the run ends.
-        state : State or None
-            State at the start, or None for the start of the rig.
-        """
-        numerics = self.numerics
-        schedule = cases.Schedule(cycles, numerics.window, np.unique(times), travel)
-        case = cases.make_rig_case(
-            self.model.rig,
-            self.joints.laws,
-            schedule,
-            signal=drive,
-            rtol=numerics.local,
-            n_steps=numerics.steps,
-        )
-        return engine.run_case(case, start=state)
-
-    def _make_run(
-        self, motion, drive, cycles: float, times: SampleTimes, start: State | None
-    ) -> EngineRun:
-        """Return the histories, energies and events of a motion.
-
-        `motion` is what the engine returned, with a row for each sample, and `cycles` the number of cycles of the drive.
-        `times` are those at which samples and snapshots were requested, and `start` is the state from which the motion
-        went on, None from rest.
-        """
         time = motion.rows[:, 0]
         if hasattr(drive, "band"):
             # Spectra need samples of equal distances.
@@ -254,26 +220,24 @@ class LumpedEvaluator(RunEvaluator):
             is_late = np.diff(time) > SAME_SAMPLE_TIME_TOL * drive.period
             is_late |= motion.rows[1:, -1] == Margin.AFTER
             is_kept = np.append(is_late, True)
-
-        histories = motion.make_response(self.model.rig.modes, drive)
+        histories = motion.make_response(rig.modes, drive)
         response = histories.select(is_kept)
         if self.model.grooves is not None and self.model.grooves.lifted_mass:
             response = self._add_vertical_force(response, drive)
-        window = response.select(response.time >= times.window_start * (1 - 1e-15))
 
         run = EngineRun(
             values=dict(motion.values),
             response=response,
-            window=window,
+            window=response.select(response.time >= times.window_start * (1 - 1e-15)),
+            ledger=compute_energies(motion.case, motion.final) | {"steps": float(motion.n_steps)},
+            outcome=outcome,
+            message=message,
             extremes=motion.extremes,
             phasors=motion.phasors,
-            ledger=compute_energies(motion.case, motion.final) | {"steps": float(motion.n_steps)},
-            outcome=None,
-            message="",
             end=motion.final,
             cycles_done=cycles,
             log=self._list_events(motion, drive),
-            snapshots=self._list_snapshots(histories, times.snapshots, start),
+            snapshots=self._list_snapshots(histories, times.snapshots, state),
         )
         return bands.average_over_bands(run, self.patch) if self.bands_slide_apart else run
 
@@ -298,8 +262,8 @@ class LumpedEvaluator(RunEvaluator):
         None for laws that have no such events, because some part of them always slips.
         """
         laws = [law for law, _ in self.joints.laws]
-        have_elements = laws and all(masing.has_stick(law) for law in laws)
-        if not (self.is_rigid or have_elements):
+        are_rigid = all(is_rigid(law.law) for law in laws)
+        if not laws or not (are_rigid or all(masing.has_stick(law) for law in laws)):
             return None
         directions = motion.find_directions()
         rows = motion.event_rows
@@ -320,18 +284,22 @@ class LumpedEvaluator(RunEvaluator):
         those of the whole motion with its events, `times` [s] are those of the snapshots, and `start` is the `State`
         from which the motion went on, or None.
         """
-        if not len(times) or self.is_rigid or not self.joints.elements:
+        if not len(times) or not self.joints.elements:
             return []
-
         at = np.searchsorted(histories.time, times)
         states = []
-        for i, (_, limit) in enumerate(self.joints.elements):
-            remembered = [] if start is None else _list_remembered_slides(start, i)
+        for i, (_, yields) in enumerate(self.joints.elements):
+            remembered = np.zeros(0)
+            if start is not None:
+                # Slides of the origin and of the reversals that the law remembers
+                memory = start.memory[i]
+                stack = memory[Memory.STACK :: 2][: int(memory[Memory.COUNT])]
+                remembered = memory[Memory.ORIGIN] + np.append(0.0, stack)
             path = np.append(remembered, histories.slides[:, i])
-            states.append(find_stretches(limit, path, at + len(remembered)))
+            states.append(find_stretches(yields, path, at + remembered.size))
         return [ElementSnapshot(float(time), faces) for time, *faces in zip(times, *states)]
 
-    def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
+    def describe_cycles(self, run, drive) -> dict:
         """Return the measures of the engine.
 
         Bands that slide independently are parts of a single interface, whose loop of the mean displacement is that of
@@ -343,8 +311,6 @@ class LumpedEvaluator(RunEvaluator):
             Run of the engine `hybrid`.
         drive
             Drive of this run, which may be a single level.
-        stuck : bool
-            Whether the interface is stuck during the last cycles.
         """
         values = {
             name: None if np.isnan(value) else float(value) for name, value in run.values.items()
@@ -361,14 +327,22 @@ class LumpedEvaluator(RunEvaluator):
                 # The interface moves in several modes.
                 values["equivalent_damping"] = None
             work = window.extra["ledger"][0]
-            energies = run.ledger | compute_sampled_work(window)
-            values["work_check"] = compute_work_check(energies | {"booked": work[-1] - work[0]})
+            # Friction work of all interfaces by the trapezoidal rule, and its magnitude
+            pairs = zip(window.slides.T, window.forces.T)
+            sampled = [friction.path_work.sampled_work(*pair) for pair in pairs]
+            known = {
+                "sampled": sum(float(part.sum()) for part in sampled),
+                "passed": sum(float(abs(part).sum()) for part in sampled),
+                "booked": work[-1] - work[0],
+            }
+            values["work_check"] = compute_work_check(run.ledger | known)
         if not self.bands_slide_apart:
             return {"integrated": values}
 
         names = ["slip_start_phase"]
         for group in BAND_MEASURE_GROUPS:
             names += select_names(group)
+        place = (window.time - window.time[0]) / np.diff(window.time).max()
         # The yaw does work in addition to that of the mean displacement.
         work = np.ptp(window.extra["ledger"][0, [0, -1]])
         cycles = (window.time[-1] - window.time[0]) / drive.period
@@ -377,7 +351,7 @@ class LumpedEvaluator(RunEvaluator):
             "is_single_interface": True,
             "loop": compute_sampled_loop(window, drive, float(work / cycles)),
             # The other measures need samples of equal distances.
-            "window": window.select(_find_even_samples(window)),
+            "window": window.select(np.abs(place - np.round(place)) <= SAME_PLACE_TOL),
         }
 
     def estimate_run_errors(self, run, drive, values: Values) -> Values:
@@ -399,7 +373,7 @@ class LumpedEvaluator(RunEvaluator):
         count = run.window.time.size
         samples = np.append(np.arange(0, count - 1, 2), count - 1)
         thinned = replace(run, window=run.window.select(samples))
-        coarse_values = self.evaluate_measures(thinned, drive, run.response.extra.get("ledger"))
+        coarse_values = self.evaluate_measures(thinned, drive)
         errors = {}
         for name, change in compute_absolute_changes(values, coarse_values).items():
             if change > 0 and name not in ERROR_MEASURES:
@@ -408,16 +382,16 @@ class LumpedEvaluator(RunEvaluator):
                 errors[name] = error + row.sample_error / LATE_SAMPLES_PER_CYCLE
         return errors
 
-    def collect_solution_fields(self, run) -> Fields:
-        """Return the free vibration that remains after the last slip of a release, by the name of its field in `Solution`.
+    def find_tail(self, run) -> VibratingMode | None:
+        """Return the free vibration that remains after the last slip of a release, or None.
 
-        No interface slips any more, so that the rig is linear. The dict is empty for other drives and nonlinear springs.
+        No interface slips any more, so that the rig is linear. There is none for other drives and nonlinear springs.
         """
         rig = self.model.rig
         is_linear = not self.joints.laws
         springs = np.zeros(len(rig.modes.interfaces)) if is_linear else self.joints.springs
         if rig.drive.kind != "free" or not np.isfinite(springs).all() or rig.springs.is_nonlinear:
-            return {}
+            return None
 
         # The part of the motion in which no interface slips.
         motion = run.response
@@ -428,20 +402,7 @@ class LumpedEvaluator(RunEvaluator):
         vibration = []
         if motion.time.size > 1:
             vibration = compute_stuck_vibration(rig.modes, springs, motion)
-        return {"tail": select_strongest(vibration)} if vibration else {}
-
-
-def _find_even_samples(window: Response) -> np.ndarray:
-    """Return which samples (k,) of a window lie at equal distances in time; the others are those of events."""
-    position = (window.time - window.time[0]) / np.diff(window.time).max()
-    return np.abs(position - np.round(position)) <= 1e-6
-
-
-def _list_remembered_slides(state: State, interface: int) -> np.ndarray:
-    """Return the slides (k,) [m] of the origin and of the reversals that a law remembers."""
-    memory = state.memory[interface]
-    stack = memory[Memory.STACK :: 2][: int(memory[Memory.COUNT])]
-    return memory[Memory.ORIGIN] + np.append(0.0, stack)
+        return select_strongest(vibration) if vibration else None
 
 
 def choose_sample_times(numerics, drive, cycles: float, n_frames: int = 0) -> SampleTimes:
@@ -489,11 +450,3 @@ def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray
     """
     count = round((end - begin) / period * LATE_SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))
-
-
-def remove_incomplete_cycle(run):
-    """Remove the extremes and the complex amplitude of a last cycle that a run did not complete."""
-    count = int(run.cycles_done + 1e-9)
-    if not count:
-        return run
-    return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])

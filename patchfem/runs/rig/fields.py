@@ -8,8 +8,7 @@ import numpy as np
 
 from ... import friction, slip
 from ...effects import law_has_trait, needs_bond_list
-from ..bench import averaged_law
-from ..bench import shear as bench_shear
+from ..interfaces import averaged_law, contact_points
 from ..patch import jenkins_elements
 from ..results.interfaces import Face
 from ..results.patch_rows import Arrays
@@ -38,11 +37,11 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     """
     sigma = patch.pressure.sigma_n
     f = model.friction
-    window = solution.window
+    window = solution.run.window
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)
     # A motion without snapshots is that of a single point.
-    snapshots = solution.snapshots
+    snapshots = solution.run.snapshots
     n_samples = len(window.time)
     first = max(0, n_samples - 1 - n_samples // numerics.window)
     samples = np.linspace(first, n_samples - 1, N_INTERFACE_FRAMES).round().astype(int)
@@ -62,12 +61,10 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
         has_nodes = is_below or (has_shear and solution.contact.elements is None)
 
     if has_nodes or (has_shear and model.grooves is not None):
-        tau, local = bench_shear.compute_point_fields(patch, solution.contact, snapshots)
+        tau, local = contact_points.compute_point_fields(patch, solution.contact, snapshots)
     elif has_shear:
-        length = friction.record.make_law(f, patch.pressure.load).length
-        elements = (solution.contact.reduction, length)
         states = [(snapshot.slide, snapshot.stretch) for snapshot in snapshots]
-        return _make_element_frames(patch, f.static, elements, list_frames("time"), states)
+        return _make_element_frames(patch, f, list_frames("time"), states)
     else:
         force = list_frames("force")
         tau = np.outer(force / patch.pressure.load, sigma)
@@ -94,46 +91,43 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
     """
     out = []
     for face in faces:
-        law = model.rig.friction.interfaces[face.number]
-        fields = collect_rest_frame(face.patch)
-
+        keys = model.rig.friction.interfaces[face.number].numbers
+        fields = None
         # Only an interface whose pieces deform in shear has slip that varies along x.
         if face.partial_slip and snapshots:
-            static = law.numbers.static
-            length = friction.record.make_law(law.numbers, law.load).length
-            found = jenkins_elements.make_elements(face.patch, static, length).jenkins_set
-            if found is not None:
-                states = [snapshot.faces[face.number] for snapshot in snapshots]
-                time = np.array([snapshot.time for snapshot in snapshots])
-                fields = _make_element_frames(face.patch, static, (found, length), time, states)
-        out.append(face._replace(fields=fields))
+            states = [snapshot.faces[face.number] for snapshot in snapshots]
+            times = [snapshot.time for snapshot in snapshots]
+            fields = _make_element_frames(face.patch, keys, times, states)
+        out.append(face._replace(fields=fields or collect_rest_frame(face.patch)))
     return tuple(out)
 
 
-def _make_element_frames(
-    patch, static: float, elements: "tuple[slip.shear_modes.JenkinsSet, float]", time, states
-) -> Arrays:
+def _make_element_frames(patch, keys, times, states) -> Arrays | None:
     """Return the fields of an interface whose pieces deform in shear, from the stretches of its parallel elements.
+
+    They are None without load.
 
     Parameters
     ----------
     patch : Patch
         Solved patch.
-    static : float
-        Coefficient of static friction.
-    elements : tuple
-        JenkinsSet, and the length [m] of the bonds in series with it.
-    time : (f,) array
+    keys : Friction
+        Effective keys of the friction law, whose bonds are in series with the pieces.
+    times : (f,) list
         Times of the frames [s].
     states : list of tuple
         Slide [m] and stretches (t,) [m] in each frame.
     """
-    jenkins_set, length = elements
+    static = keys.static
+    length = friction.record.make_law(keys, patch.pressure.load).length
+    jenkins_set = jenkins_elements.make_elements(patch, static, length).jenkins_set
+    if jenkins_set is None:
+        return None
     tau, local = slip.fields.compute_element_fields(patch, jenkins_set, states, length)
     # The tractions of the cells of a face are interpolated, so that they do not reach their limits exactly.
     limit = None if patch.model.area is not None else static * patch.pressure.sigma_n
     slide = np.array([slide for slide, _ in states])
-    return make_interface_frames(patch, time, tau, local, slide, SlipRule(limit))
+    return make_interface_frames(patch, np.array(times), tau, local, slide, SlipRule(limit))
 
 
 def _collect_varying_load_fields(patch, solution) -> Arrays:
@@ -144,7 +138,7 @@ def _collect_varying_load_fields(patch, solution) -> Arrays:
     # The first frame is the pressed patch at rest; the others are snapshots of the motion.
     sets = solution.contact.sets
     weight = patch.pieces.interface.weight
-    snapshots = solution.snapshots
+    snapshots = solution.run.snapshots
     time = np.array([0.0, *(snapshot.time for snapshot in snapshots)])
     slide = np.array([0.0, *(snapshot.slide for snapshot in snapshots)])
     nodal = np.stack([patch.pressure.sigma_n * weight, *(snapshot.nodal for snapshot in snapshots)])

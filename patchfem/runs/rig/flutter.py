@@ -60,9 +60,9 @@ def compute_flutter_amplitude(run) -> tuple[Measures, list[str]]:
     cycles, reason, smallest_amplitude = _find_limit_cycles(model, run.numerics, run.patch)
 
     end_notes = []
-    outcome = run.solution.outcome
+    outcome = run.solution.run.outcome
     if outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_COMPUTED_DISPLACEMENT:
-        end_time = run.solution.response.time[-1]
+        end_time = run.solution.run.response.time[-1]
         end_notes.append(
             f"the run ended after {end_time:.4g} s, when the motion exceeded {MAX_COMPUTED_DISPLACEMENT:g} m"
         )

@@ -10,18 +10,13 @@ from time import process_time
 import numpy as np
 
 from ...core import Outcome, add_interface_number
-from ...effects import law_has_trait
-from ...response.loops import CycleLoop
 from ...response.measures import Values, bound_sampling_errors, compute_step_harmonic
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ...time_steps import time_march as engine
-from . import bands
-from .bond_lists import choose_bond_summation
-from .contact_points import make_contact
+from ..interfaces import bands
+from ..interfaces.contact_points import make_contact
 from .evaluation import (
-    Fields,
     RunEvaluator,
-    Solution,
     compute_sampled_loop,
     compute_work_check,
     describe_escape,
@@ -32,8 +27,8 @@ from .evaluation import (
 MAX_HELD_MOVE = 1e-9
 
 
-def march_in_time(model, numerics, patch, n_frames: int = 0, say=None, progress=None) -> Solution:
-    """Integrate the motion of a rig in time steps and evaluate its measures, without errors from coarse runs.
+class MarchEvaluator(RunEvaluator):
+    """Evaluator that computes runs with equal time steps, and measures from them.
 
     Parameters
     ----------
@@ -43,23 +38,15 @@ def march_in_time(model, numerics, patch, n_frames: int = 0, say=None, progress=
         Steps per cycle, cycles and window.
     patch : Patch or None
         None under [normal] and between masses.
-    n_frames : int
-        Number of snapshots of the interface in the last cycle.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction.
+    say : callable, optional
+        Callback for a line of text.
     """
-    begin = process_time()
-    contact = make_contact(model, numerics, patch)
-    reduced = process_time() - begin
-    engine.load_kernels(contact, say)
-    prepare = {"reduce": reduced, "compiled_code": process_time() - begin - reduced}
-    return MarchEvaluator(model, numerics, patch, contact).solve(n_frames, progress, prepare)
 
-
-class MarchEvaluator(RunEvaluator):
-    """Evaluator that computes runs with equal time steps, and measures from them."""
-
-    def __init__(self, model, numerics, patch, contact):
+    def __init__(self, model, numerics, patch, say=None):
+        begin = process_time()
+        contact = make_contact(model, numerics, patch)
+        reduced = process_time() - begin
+        engine.load_kernels(contact, say)
         stick_tolerance = 0.0
         if model.friction is not None and contact.set_valued:
             drive = model.rig.drive.signal
@@ -67,6 +54,8 @@ class MarchEvaluator(RunEvaluator):
         elif model.friction is not None:
             stick_tolerance = 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, stick_tolerance)
+        loaded = process_time() - begin - reduced
+        self.prepare = {"reduce": reduced, "compiled_code": loaded}
 
     def integrate(
         self, drive, cycles: float, before: engine.Motion | None, n_frames: int = 0, progress=None
@@ -114,13 +103,6 @@ class MarchEvaluator(RunEvaluator):
         force = run.window.force
         return replace(run, step_force=(force[1:] + force[:-1]) / 2)
 
-    def collect_solution_fields(self, run) -> Fields:
-        """Return {"bond_summation": method by which the bonds were summed}, or {} for a law without bonds."""
-        interfaces = self.model.rig.friction.interfaces
-        if not any(law_has_trait(interface.numbers.law, "bonds") for interface in interfaces):
-            return {}
-        return {"bond_summation": choose_bond_summation(self.model, self.numerics)}
-
     def estimate_run_errors(self, run, drive, values: Values) -> Values:
         """Estimate how far the peaks of a motion exceed its samples.
 
@@ -133,9 +115,8 @@ class MarchEvaluator(RunEvaluator):
         values : dict of float
             Measures by name.
         """
-        return bound_sampling_errors(run.window) | dict.fromkeys(
-            self._find_release_forces(run.window), 0.0
-        )
+        known = self._find_release_forces(run.window)
+        return bound_sampling_errors(run.window) | dict.fromkeys(known, 0.0)
 
     def _find_release_forces(self, window) -> Values:
         """Return the static friction limits [N] of rigid interfaces that stick and slip in a window, by name of their peak.
@@ -153,59 +134,45 @@ class MarchEvaluator(RunEvaluator):
                 peaks[name] = float(point_set.law.limits.sum())
         return peaks
 
-    def describe_cycles(self, run, drive, *, stuck: bool) -> Fields:
+    def describe_cycles(self, run, drive) -> dict:
         """Return the check of the friction work, the friction loop, the energies, and the measures of a stuck interface.
-
-        Parameters
-        ----------
-        run : time_steps.time_march.Motion
-            Motion in time steps.
-        drive
-            Drive of this motion, which may be a single level.
-        stuck : bool
-            Whether the interface is stuck during the last cycles.
-        """
-        if not self.has_friction:
-            return {}
-        energies = run.ledger
-        missing = {}
-        if stuck and self.contact.set_valued:
-            # The remaining motion of a stuck interface is round-off, not slip. Its energies are compared with the kinetic
-            # energy at the peak speed of the drive.
-            rig = self.model.rig
-            moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
-            energies = energies | {"power": energies["power"] + moving}
-            missing = {"slip_start_phase": None, "stick_fraction": 1.0}
-        values = {"work_check": compute_work_check(energies)} | missing
-        values |= self._find_release_forces(run.window)
-        return {
-            "integrated": values,
-            "run_energies": energies,
-            "loop": self._compute_hysteresis_loop(run, drive),
-            "slide_round_off": self.stick_tolerance if self.contact.set_valued else 0.0,
-            "is_single_interface": self.model.rig.friction.bands_slide_apart,
-        }
-
-    def _compute_hysteresis_loop(self, run, drive) -> CycleLoop | None:
-        """Return the first harmonics of slide and friction force, and the friction work per cycle; None without a window.
 
         Parameters
         ----------
         run : time_steps.time_march.Motion
             Motion in time steps, with the friction force and work of its window.
         drive
-            Drive of this motion.
+            Drive of this motion, which may be a single level.
         """
-        window = run.window
-        work = run.window_work
+        if not self.has_friction:
+            return {}
+        rig = self.model.rig
+        energies = run.ledger
+        missing = {}
+        if self.contact.set_valued and self.is_stuck(run):
+            # The remaining motion of a stuck interface is round-off, not slip. Its energies are compared with the kinetic
+            # energy at the peak speed of the drive.
+            moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
+            energies = energies | {"power": energies["power"] + moving}
+            missing = {"slip_start_phase": None, "stick_fraction": 1.0}
+        values = {"work_check": compute_work_check(energies)} | missing
+
         # `window_work` is that of all interfaces, whose stops and releases within a step it contains; that of the first of
         # several ones is int F dx. Bands that yaw do more work than follows from their mean displacement.
-        if len(self.model.rig.friction.names) > 1:
+        window = run.window
+        work = run.window_work
+        if len(rig.friction.names) > 1:
             work = float(run.step_force @ np.diff(window.slide))
-
+        loop = None
         span = window.time[-1] - window.time[0]
-        if not span > 0:
-            return None
-        # The mean force of a step includes the impulses in it, e.g. at the end of slip.
-        force = compute_step_harmonic(window.time, run.step_force, find_drive_omega(drive))
-        return compute_sampled_loop(window, drive, work * drive.period / span, force)
+        if span > 0:
+            # The mean force of a step includes the impulses in it, e.g. at the end of slip.
+            force = compute_step_harmonic(window.time, run.step_force, find_drive_omega(drive))
+            loop = compute_sampled_loop(window, drive, work * drive.period / span, force)
+        return {
+            "integrated": values | self._find_release_forces(window),
+            "run_energies": energies,
+            "loop": loop,
+            "slide_round_off": self.stick_tolerance if self.contact.set_valued else 0.0,
+            "is_single_interface": rig.friction.bands_slide_apart,
+        }

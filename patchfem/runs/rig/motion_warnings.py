@@ -25,9 +25,9 @@ from ...response.outcome import (
 )
 from ...response.rows import AMPLITUDE
 from ..bench import bench
+from ..interfaces import joints
 from ..results.interfaces import Face, merge_sentences, warn_of_large_slide
 from ..results.notes import LAW_NOTES, LAW_WARNINGS
-from . import joints
 from .engines import ENGINES, find_obstacle_of_map
 
 # Number of cycles that are added to see whether the last loop of a bench is steady.
@@ -39,6 +39,9 @@ SINGLE_POINT_WARNING = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
     "same load; add [contact.shear] to let the patch slip part by part"
+)
+NEGLECTED_YAW_NOTE = (
+    "the yaw also moves the ends of the patch across x; this motion and its friction are neglected"
 )
 
 
@@ -57,84 +60,71 @@ def collect_remarks(run) -> tuple[list[str], list[str]]:
 
 
 def _warn_of_single_points(run) -> list[str]:
-    """Return warnings on patches that move exactly like single points, so that their shape has no effect on the motion."""
-    return merge_sentences(
-        run.model,
-        run.inputs.faces,
-        lambda face: [SINGLE_POINT_WARNING] if _is_single_point(run, face) else [],
-    )
+    """Return warnings on patches that move exactly like single points, so that their shape has no effect on the motion.
 
-
-def _is_single_point(run, face: Face) -> bool:
-    """Return whether an interface has the motion of a single point with the same load.
-
-    It does if its pieces are rigid in shear, its load is constant, and the pressure moves with the upper piece. Without
-    friction no shape matters.
+    Their pieces are rigid in shear, their load is constant, and the pressure moves with the upper piece. Without friction
+    no shape matters.
     """
     model = run.model
-    law = face.model.friction
-    can_move = model.rig.friction.load_varies or model.rig.friction.bands_slide_apart
-    is_flat = not (face.partial_slip or model.side == "lower" or can_move)
-    has_friction = law is not None and law.static > 0
-    return is_flat and has_friction and not law_has_trait(law.law, "averaged")
+    friction = model.rig.friction
+    if friction.load_varies or friction.bands_slide_apart or model.side == "lower":
+        return []
+
+    def warn(face: Face) -> list[str]:
+        """Return the warning on an interface."""
+        law = face.model.friction
+        has_friction = law is not None and law.static > 0 and not law_has_trait(law.law, "averaged")
+        return [SINGLE_POINT_WARNING] * (has_friction and not face.partial_slip)
+
+    return merge_sentences(model, run.inputs.faces, warn)
 
 
 def _warn_of_engine(run) -> Iterator[str]:
     """Warn of what the engine reports: an unfinished change of the drive, its own messages, and remaining vibration.
 
-    An end at the grooves is no defect of the run, so that it is a note (`_note_on_end`).
+    Free vibration may remain, because a stuck interface dissipates nothing. An end at the grooves is no defect of the run,
+    so that it is a note (`_note_on_end`).
     """
-    solution = run.solution
+    motion = run.solution.run
+    rig = run.model.rig
     yield from note_on_changing_drive(run.outcome, run.drive)
-    yield from solution.notes
-    yield from _warn_of_ringing(run)
-    if solution.message and solution.outcome is not Outcome.LEAVES_GROOVES:
-        yield solution.message
+    yield from run.solution.steady.notes if run.solution.steady is not None else ()
+    if not rig.drive.levels.amplitudes:
+        tolerance = run.model.accuracy.tolerance
+        rate = structure.drive_sizes.find_min_decay_rate(rig.modes)
+        ringing = find_ringing(motion, run.measures, (tolerance, rate), run.drive)
+        if ringing:
+            limits = (tolerance, rate * run.drive.period)
+            ratio = ringing / run.measures[AMPLITUDE].value
+            yield describe_ringing(ratio, limits, run.numerics.cycles)
+    if motion.message and motion.outcome is not Outcome.LEAVES_GROOVES:
+        yield motion.message
 
 
-def _warn_of_ringing(run) -> Iterator[str]:
-    """Warn of free vibration that may remain, because a stuck interface dissipates nothing."""
-    model = run.model
-    if model.rig.drive.levels.amplitudes:
-        return
-    tolerance = model.accuracy.tolerance
-    rate = structure.drive_sizes.find_min_decay_rate(model.rig.modes)
-    ringing = find_ringing(run.solution, run.measures, (tolerance, rate), run.drive)
-    if ringing:
-        limits = (tolerance, rate * run.drive.period)
-        ratio = ringing / run.measures[AMPLITUDE].value
-        yield describe_ringing(ratio, limits, run.numerics.cycles)
-
-
-def _warn_of_peak_at_end_frequency(run) -> Iterator[str]:
-    """Warn if the largest response of a sweep lies at its lowest or highest frequency."""
+def _warn_of_peak(run) -> Iterator[str]:
+    """Warn if the largest response of a sweep lies at an end of its range, or if a rigid law holds the output at rest."""
     peak = run.measures.get("peak_frequency")
-    if peak is None or not peak.value or run.measures[AMPLITUDE].value <= MAX_RESTING_SLIDE_RANGE:
+    friction = run.model.friction
+    if peak is None:
+        return
+    if run.measures[AMPLITUDE].value <= MAX_RESTING_SLIDE_RANGE:
+        if friction is not None and law_has_trait(friction.law, "set-valued"):
+            yield (
+                f"the interface sticks at all frequencies, and law '{friction.law}' is rigid while it sticks, so that the "
+                "output does not move; law 'elastic-plastic' has the stiffness of the contact (Jenkins element: a spring "
+                "and a slider)"
+            )
         return
     drive = run.model.rig.drive.signal
     ends = {"drive.from": drive.low, "drive.to": drive.high}
     for key, end in ends.items():
-        if abs(peak.value - end) <= SAME_FREQUENCY_TOL * end:
+        if peak.value and abs(peak.value - end) <= SAME_FREQUENCY_TOL * end:
             side, move = ("upper", "raise") if end == max(ends.values()) else ("lower", "lower")
             yield (
                 f"the largest response lies at {key} = {format_number(end, 6)} Hz, the {side} end of the swept "
                 f"frequencies, so that it may be no resonance; {move} {key}"
             )
             return
-
-
-def _warn_of_curve_at_rest(run) -> Iterator[str]:
-    """Warn if a rigid law holds the output at rest at all frequencies of a sweep."""
-    friction = run.model.friction
-    if friction is None or "peak_frequency" not in run.measures:
-        return
-    is_at_rest = run.measures[AMPLITUDE].value <= MAX_RESTING_SLIDE_RANGE
-    if is_at_rest and law_has_trait(friction.law, "set-valued"):
-        yield (
-            f"the interface sticks at all frequencies, and law '{friction.law}' is rigid while it sticks, so that the "
-            "output does not move; law 'elastic-plastic' has the stiffness of the contact (Jenkins element: a spring and a "
-            "slider)"
-        )
 
 
 def _warn_of_sparse_record(run) -> Iterator[str]:
@@ -157,40 +147,28 @@ def _warn_of_large_slides(run) -> list[str]:
     return merge_sentences(
         run.model,
         run.inputs.faces,
-        lambda face: warn_of_large_slide(face.patch, face.slide(run.solution.response)),
+        lambda face: warn_of_large_slide(face.patch, face.slide(run.solution.run.response)),
     )
 
 
 # ---- benches
 
 
-def _compute_loop_closing_error(fine) -> float:
-    """Return the relative difference between start and end of the last cycle.
-
-    It is the larger of the change of the force over its peak and the change of the stored energy
-    over the work.
-    """
-    force = fine.force[fine.first :]
-    work, stored, *_ = fine.ledger[:, fine.first :]
-    gap = 0.0
-    for change, size in (
-        (force[-1] - force[0], np.abs(force).max()),
-        (stored[-1] - stored[0], work[-1] - work[0]),
-    ):
-        if size:
-            gap = max(gap, abs(float(change / size)))
-    return gap
-
-
 def _warn_of_open_loop(run) -> list[str]:
     """Return a list with a warning if the last friction loop of a bench is not closed, nor its area that of a longer run."""
     model = run.model
-    fine = run.solution.response
+    fine = run.solution.run.response
     tolerance = model.accuracy.tolerance
     slide = model.slide
     if slide.period is None or slide.cycles < 1 or not fine.values.get("loop_area"):
         return []
-    gap = _compute_loop_closing_error(fine)
+    # Relative difference between start and end of the last cycle: the change of the force over its peak, or that of the
+    # stored energy over the work.
+    force = fine.force[fine.first :]
+    work, stored, *_ = fine.ledger[:, fine.first :]
+    changes = (force[-1] - force[0], stored[-1] - stored[0])
+    sizes = (np.abs(force).max(), work[-1] - work[0])
+    gap = max((abs(float(a / b)) for a, b in zip(changes, sizes) if b), default=0.0)
     if gap <= tolerance:
         return []
     text = (
@@ -200,10 +178,9 @@ def _warn_of_open_loop(run) -> list[str]:
 
     # The comparison must not end a run that is complete.
     cycles = slide.cycles + N_STEADY_CHECK_CYCLES
+    longer_model = replace(model, slide=replace(slide, cycles=cycles))
     try:
-        longer = bench.run_bench(
-            replace(model, slide=replace(slide, cycles=cycles)), run.patch, run.numerics.steps
-        )
+        longer = bench.run_bench(longer_model, run.patch, run.numerics.steps)
     except NotConverged:
         return [f"{text}; raise slide.cycles"]
 
@@ -219,7 +196,7 @@ def _warn_of_open_loop(run) -> list[str]:
 
 def _warn_of_overhang(run) -> Iterator[str]:
     """Warn if the upper piece of a bench slides off the loaded area."""
-    load = run.solution.response.load
+    load = run.solution.run.response.load
     load_loss = 1 - float(load.min() / load[0]) if load[0] > 0 else 0.0
     if run.patch is not None and load_loss > 0.01:
         yield (
@@ -231,20 +208,21 @@ def _warn_of_overhang(run) -> Iterator[str]:
 # ---- notes on rigs
 
 
-def _note_on_fields_of_bands(run) -> Iterator[str]:
-    """Note that bands yaw as a whole."""
+def _note_on_bands(run) -> Iterator[str]:
+    """Note that the bands of a face yaw as wholes."""
     if run.model.rig.friction.bands_slide_apart:
         yield f"the face yaws as {model_structure.N_YAW_BANDS} bands of cells, each with the displacement of its middle"
 
 
 def _note_on_elements_without_slip(run) -> Iterator[str]:
     """Note that a steady motion is not unique if some elements of the joint never slip in it."""
-    is_steady = run.solution.outcome in (Outcome.STEADY, Outcome.STUCK) and run.has_friction
+    is_steady = run.solution.run.outcome in (Outcome.STEADY, Outcome.STUCK) and run.has_friction
     is_found = ENGINES[run.numerics.engine].finds_periodic_motion
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
         return
-    slides = run.solution.window.slides.T
-    for joint, slide in zip(joints.list_joints(run.model, run.patch, run.numerics.meshed), slides):
+    slides = run.solution.run.window.slides.T
+    parts = joints.list_parts(run.model, run.patch, run.numerics.meshed)
+    for joint, slide in zip(parts, slides):
         _, yields = joint.list_elements()
         largest_yield = float(yields.max(initial=0.0))
         amplitude = float(np.ptp(slide)) / 2
@@ -260,11 +238,11 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
 
 def _note_on_smallest_slip_of_onset(run) -> Iterator[str]:
     """Note the smallest slip that counts as the onset, in a run of drive levels whose interface is elastic in stick."""
-    solution = run.solution
+    found = run.solution.levels
     is_by_slip = run.model.rig.drive.levels.onset[0] == "slip"
-    if solution.levels and is_by_slip and solution.stick_tolerance > 0:
+    if found is not None and is_by_slip and found.stick_tolerance > 0:
         yield (
-            f"onset_level: slip counts only if its amplitude is above {format_length(solution.stick_tolerance)}, "
+            f"onset_level: slip counts only if its amplitude is above {format_length(found.stick_tolerance)}, "
             "a thousandth of the elastic range of the interface; a part of the interface may slip earlier"
         )
 
@@ -282,9 +260,10 @@ def note_on_creep(friction) -> list[str]:
 def _note_on_end(run) -> Iterator[str]:
     """Note on the neglected lateral motion of a face that yaws, and on an end at the grooves, which is no defect."""
     if run.model.rig.friction.bands_slide_apart:
-        yield "the yaw also moves the ends of the patch across x; this motion and its friction are neglected"
-    if run.solution.message and run.solution.outcome is Outcome.LEAVES_GROOVES:
-        yield run.solution.message
+        yield NEGLECTED_YAW_NOTE
+    motion = run.solution.run
+    if motion.message and motion.outcome is Outcome.LEAVES_GROOVES:
+        yield motion.message
 
 
 SLIDE_WARNINGS = (*LAW_WARNINGS, _warn_of_open_loop, _warn_of_overhang, _warn_of_large_slides)
@@ -293,15 +272,14 @@ MOTION_WARNINGS = (
     *LAW_WARNINGS,
     _warn_of_single_points,
     _warn_of_engine,
-    _warn_of_peak_at_end_frequency,
-    _warn_of_curve_at_rest,
+    _warn_of_peak,
     _warn_of_sparse_record,
     _warn_of_large_slides,
 )
 MOTION_NOTES = (
     lambda run: run.model.rig.structure.reduction_notes,
     *LAW_NOTES,
-    _note_on_fields_of_bands,
+    _note_on_bands,
     _note_on_elements_without_slip,
     _note_on_smallest_slip_of_onset,
     lambda run: note_on_creep(run.model.friction),

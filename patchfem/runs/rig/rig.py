@@ -10,8 +10,9 @@ from math import ceil, floor, log, log2
 
 import numpy as np
 
-from ... import structure
-from ...core import NotConverged, Outcome, PatchfemError
+from ... import compiled, structure
+from ...convergence import convergence_error
+from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...model import rig as model_rig
 from ...response import reasons, stationary
 from ...response.decay_curve import DecayCurve
@@ -30,31 +31,29 @@ from ...response.rows import set_final_floors
 from ...response.settling import find_slip_period
 from .. import refine
 from ..bench import bench
+from ..bench import engine as bench_engine
+from ..bench.engine import MIN_RELATIVE_STEP_ERROR, Numerics
+from ..interfaces import bond_lists
 from ..results.interfaces import check_pieces_overlap
 from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, Settings, Shortage
-from . import bond_lists, comparisons, decays, event_to_event, flutter, march, slides
+from . import comparisons, decays, event_to_event, flutter, levels, march, slides
 from . import fields as interface_fields
-from .engines import (
-    ENGINES,
-    HYBRID,
-    MARCH,
-    MAX_MARCH_STEPS_PER_CYCLE,
-    MIN_RELATIVE_STEP_ERROR,
-    Numerics,
-    choose_numerics,
-    make_bench_numerics,
-)
-from .evaluation import (
-    Solution,
-    add_level_errors,
-    compute_peak_frequency,
-    convert_to_scene_units,
-    first_interface_load,
-    measure_onset_level,
-    replace_output_by_gauge,
-)
+from .engines import ENGINES, HYBRID, MARCH, MAX_MARCH_STEPS_PER_CYCLE, choose_numerics
+from .evaluation import Solution, first_interface_load, replace_output_by_gauge
 from .motion_warnings import collect_remarks
 from .steady import shooting
+
+# Outcomes of runs that ended early; more steps do not change them.
+EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
+MAX_REFINED_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
+# Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
+MIN_MOTION_RELATIVE_ERROR = 1e-9
+# Largest number of steps times nodes of a run that is repeated with smaller steps for measures that are not main ones. It
+# takes some 0.1 s of CPU time. The entries of a list of bonds count as nodes.
+MAX_NODE_STEPS_FOR_OTHER_MEASURES = 1e6
+# Work of a step in which the pressure of a patch is solved, relative to that of another step.
+PRESSING_STEP_WORK_RATIO = 40.0
+NO_PEAK_REASON = "the output does not move at any of the swept frequencies, so there is no peak"
 
 
 def solve_rig(model, numerics, patch, n_frames: int = 0, say=None, progress=None) -> Solution:
@@ -75,14 +74,17 @@ def solve_rig(model, numerics, patch, n_frames: int = 0, say=None, progress=None
     """
     # Only the module of this engine is loaded.
     if numerics.engine == "bench":
-        return slides.solve_slide(model, numerics, patch, n_frames, say, progress)
+        run = bench.follow_slide(model, numerics, patch, n_frames, say=say, progress=progress)
+        return slides.make_slide_solution(run)
+    if numerics.engine == "harmonic":
+        solution = shooting.solve_steady_motion(model, numerics, patch, n_frames, say)
+        return replace_output_by_gauge(model, solution)
     if numerics.engine == "hybrid":
-        run = event_to_event.run_from_event_to_event
-    elif numerics.engine == "march":
-        run = march.march_in_time
+        compiled.report_compilation_to(say)
+        evaluator = event_to_event.LumpedEvaluator(model, numerics, patch)
     else:
-        run = shooting.solve_steady_motion
-    return replace_output_by_gauge(model, run(model, numerics, patch, n_frames, say, progress))
+        evaluator = march.MarchEvaluator(model, numerics, patch, say)
+    return replace_output_by_gauge(model, evaluator.solve(n_frames, progress))
 
 
 class Runner:
@@ -119,17 +121,18 @@ class Runner:
         self.solutions: dict[Numerics, Solution] = {}
         self._done = 0.0  # reported fraction of all runs
 
-    def solve(self, numerics: Numerics, say=None) -> Solution:
-        """Solve the rig on its finest meshes, and store the frames of the interface that its result shows."""
-        has_fields = self.patches[0] is not None or self.model.has_interface_patches
-        return self._solve(
-            self.model, numerics, self.patches[0], N_INTERFACE_FRAMES * has_fields, say
-        )
+    def solve(self, numerics: Numerics, say=None, n_frames: int = 0) -> Solution:
+        """Solve the rig, and report the completed fraction of all runs.
 
-    def _solve_coarse_run(self, numerics: Numerics) -> Solution:
-        """Solve the rig with the settings of a comparison run, without frames of the interface.
-
-        The settings say what is coarser: the mesh, the modes of a reduced structure, or a joint whose stiffness differs.
+        Parameters
+        ----------
+        numerics : Numerics
+            Settings, which also say what is coarser: the mesh, the modes of a reduced structure, or a joint whose
+            stiffness differs.
+        say : callable, optional
+            Function that takes a line of text on the progress.
+        n_frames : int
+            Number of frames of the interface in the last cycle.
         """
         model = self.model
         patch = self.patches[numerics.coarse_patch]
@@ -138,25 +141,7 @@ class Runner:
         if numerics.stiffer_joint:
             stiffer, (patch, *_) = self.stiffer[:2]
             model = replace(stiffer, rig=replace(stiffer.rig, drive=model.rig.drive))
-        # The decay curve needs histories from the start of the run.
-        return self._solve(model, replace(numerics, whole=self.is_release), patch)
 
-    def _solve(self, model, numerics: Numerics, patch, n_frames: int = 0, say=None) -> Solution:
-        """Solve a rig, and report the completed fraction of all runs.
-
-        Parameters
-        ----------
-        model : Model
-            Model of the rig.
-        numerics : Numerics
-            Cycles, steps and other settings of the run.
-        patch : Patch or None
-            Solved patch.
-        n_frames : int
-            Number of frames of the fields in the last cycle.
-        say : callable, optional
-            Function that takes a line of text on the progress.
-        """
         # Each run is a half of what is left, because the number of coarse runs is not known.
         left = 1 - self._done
         share = left if self.is_single else left / 2
@@ -172,19 +157,12 @@ class Runner:
 
     def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
         """Estimate the errors of a run from coarse runs (`response.errors.estimate_errors`)."""
-        return estimate_errors(self._solve_coarse_run, solution.values, runs, self.solutions)
 
+        def solve(numerics: Numerics) -> Solution:
+            """Solve a coarse run; the decay curve needs histories from its start."""
+            return self.solve(replace(numerics, whole=self.is_release))
 
-# Outcomes of runs that ended early; more steps do not change them.
-EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
-MAX_REFINED_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
-# Relative error of every measure, such as round-off, which is added to the errors from comparison runs.
-MIN_MOTION_RELATIVE_ERROR = 1e-9
-# Largest number of steps times nodes of a run that is repeated with smaller steps for measures that are not main ones. It
-# takes some 0.1 s of CPU time. The entries of a list of bonds count as nodes.
-MAX_NODE_STEPS_FOR_OTHER_MEASURES = 1e6
-# Work of a step in which the pressure of a patch is solved, relative to that of another step.
-PRESSING_STEP_WORK_RATIO = 40.0
+        return estimate_errors(solve, solution.values, runs, self.solutions)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -198,6 +176,7 @@ class CoupledRun:
     - outcome: Outcome, or None before `complete_measures`.
     - decay: decay curve of a release, or None.
     - notes: sentences on the decay and on limit cycles.
+    - coarser: pairs of a coarse run and its reference run, None for this run, for decay curves and onsets.
     """
 
     inputs: RunInputs
@@ -208,6 +187,7 @@ class CoupledRun:
     outcome: Outcome | None = None
     decay: DecayCurve | None = None
     notes: tuple[str, ...] = ()
+    coarser: tuple[tuple[Solution, Solution | None], ...] = ()
 
     @property
     def model(self):
@@ -222,7 +202,8 @@ class CoupledRun:
     @property
     def drive(self):
         """Drive at which the measures are evaluated."""
-        return self.solution.drive or self.model.rig.drive.signal
+        steady = self.solution.steady
+        return (steady and steady.drive) or self.model.rig.drive.signal
 
     @property
     def has_friction(self) -> bool:
@@ -232,18 +213,21 @@ class CoupledRun:
     @property
     def settings(self) -> Settings:
         """Numerical settings that the run used, which its result states."""
-        solution = self.solution
         numerics = self.numerics
-        settings = solution.settings
-        if self.model.rig is not None:
-            settings = settings._replace(engine=numerics.engine, window_cycles=numerics.window)
-            if solution.bond_summation is not None:
-                settings = settings._replace(quadrature=solution.bond_summation.engine)
-        if ENGINES[numerics.engine].has_steps:
+        engine = ENGINES[numerics.engine]
+        choice = comparisons.find_bond_summation(self.model, numerics)
+        settings = Settings(numerics.engine, window_cycles=numerics.window)
+        if self.model.rig is None:
+            settings = Settings(bench_engine.name_engine(self.model, choice))
+        elif choice is not None:
+            settings = settings._replace(quadrature=choice.engine)
+        if engine.has_steps:
             settings = settings._replace(steps_per_cycle=numerics.steps)
+        if engine.finds_periodic_motion and self.solution.run.outcome is not Outcome.LEAVES_GROOVES:
+            settings = settings._replace(map="shooting")
 
         # A patch that slips part by part is a set of elements, or of shear modes if its load varies.
-        reduced = getattr(solution.contact, "reduction", None)
+        reduced = getattr(self.solution.contact, "reduction", None)
         if reduced is None:
             return settings
         size = int(np.size(reduced.stiffness))
@@ -258,12 +242,12 @@ class CoupledRun:
         limit = 0.0
         if self.has_friction and not varies:
             limit = self.model.friction.static * first_interface_load(self.model, self.patch)
-        return float(np.abs(self.solution.response.force).max()) / limit if limit > 0 else 0.0
+        return float(np.abs(self.solution.run.response.force).max()) / limit if limit > 0 else 0.0
 
     @property
     def has_errors(self) -> bool:
         """Whether errors are estimated: the caller wants them, the motion was found, and all meshes for them exist."""
-        is_solved = self.solution.outcome is not Outcome.NOT_CONVERGED
+        is_solved = self.solution.run.outcome is not Outcome.NOT_CONVERGED
         return self.inputs.estimate and is_solved and self.inputs.has_error_meshes
 
 
@@ -282,24 +266,20 @@ def run_motion(inputs: RunInputs) -> Result:
     PatchfemError
         If the drive excites no mode.
     """
-    if inputs.plan.model.rig is not None:
-        return _run_rig(inputs)
-    run, _ = run_refined(inputs, choose_numerics(inputs.plan.model))
-    measures = run.measures if run.has_errors else remove_errors(run.measures)
-    return _make_result(replace(run, outcome=Outcome.DONE, measures=measures))
-
-
-def _run_rig(inputs: RunInputs) -> Result:
-    """Compute the motion of a rig and return its Result."""
     model = inputs.plan.model
     rig = model.rig
-    if rig.start is None and rig.drive.kind != "free" and not np.any(rig.modes.base):
+    numerics = choose_numerics(model)
+    if rig is None:
+        run, _ = run_refined(inputs, numerics)
+        measures = run.measures if run.has_errors else remove_errors(run.measures)
+        return _make_result(replace(run, outcome=Outcome.DONE, measures=measures))
+
+    is_free = rig.drive.kind == "free"
+    if rig.start is None and not is_free and not np.any(rig.modes.base):
         raise PatchfemError(
             "the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
             "drive.kind",
         )
-
-    numerics = choose_numerics(model)
     if not inputs.plan.draws_curve and ENGINES[numerics.engine].finds_periodic_motion:
         numerics = replace(numerics, whole=False)
     if numerics.engine == "march":
@@ -317,12 +297,23 @@ def _run_rig(inputs: RunInputs) -> Result:
         run, shortage = run_refined(inputs, choose_numerics(model, MARCH))
 
     # The reasons of missing values depend on the outcome, so that they come after it.
-    if run.solution.levels and run.has_friction:
-        onset = measure_onset_level(rig, run.solution, model.accuracy.tolerance)
+    found = run.solution.levels
+    if found is not None and run.has_friction:
+        onset = levels.measure_onset_level(rig, found, run.coarser, model.accuracy.tolerance)
         run = replace(run, measures=run.measures | {"onset_level": onset})
     run = complete_measures(run)
-    if rig.drive.kind == "free" and run.has_errors:
-        run = _add_decay_curve(run)
+    decay = None
+    if is_free and run.has_errors:
+        decay = decays.compute_decay_curve(run.solution, run.coarser)
+    if decay is not None:
+        space_runs = comparisons.list_space_runs(
+            model, run.numerics, run.patch, inputs.n_coarse, run.solution
+        )
+        has_mesh_run = any(one.source == "mesh" for one in space_runs)
+        decay, notes = decays.add_mesh_errors(
+            decay, model, inputs.patches, inputs.stiffer, has_mesh_run=has_mesh_run
+        )
+        run = replace(run, decay=decay, notes=notes)
     if run.has_friction and structure.drive_sizes.find_decay_rate(rig.modes) < 0:
         measures, notes = flutter.compute_flutter_amplitude(run)
         run = replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
@@ -333,48 +324,68 @@ def _make_result(run: CoupledRun) -> Result:
     """Return the Result of a run whose measures are complete."""
     inputs = run.inputs
     model = run.model
+    rig = model.rig
     solution = run.solution
+    motion = solution.run
+    engine = ENGINES[run.numerics.engine]
 
     # Warnings and notes see the measures before their floors are raised to the tolerance.
     warnings, notes = collect_remarks(run)
     notes = [*inputs.notes, *notes, *run.notes]
     measures = set_final_floors(run.measures, model.accuracy.tolerance)
-    if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
+    if engine.finds_periodic_motion and run.outcome is Outcome.GROWS:
         measures = reasons.find_missing_unbounded(measures)
-    if model.rig is not None and model.rig.drive.waveform.is_random:
-        notes += stationary.warn_if_short(measures, solution.window)
+
+    # What a motion has beside measures and histories
+    data = MotionData(step_runs=run.step_runs)
+    if rig is not None:
+        spectra = None
+        if rig.drive.waveform.is_random:
+            notes += stationary.warn_if_short(measures, motion.window)
+            spectra = stationary.compute_spectra(motion.window, rig.drive.signal)
+        found = solution.levels.levels if solution.levels is not None else ()
+        data = data._replace(
+            period=run.drive.period,
+            energies=motion.ledger,
+            levels=levels.convert_to_scene_units(rig, found),
+            events=motion.log,
+            decay=run.decay,
+            spectra=spectra,
+            steady=solution.steady and solution.steady.data,
+        )
 
     # The fields of [contact], and those of the patches of [[structure.interface]].
     fields = {}
-    if inputs.patch is not None and model.rig is None:
-        fields = slides.collect_slide_frames(model, inputs.patch, solution.response)
+    if inputs.patch is not None and rig is None:
+        fields = slides.collect_slide_frames(model, inputs.patch, motion.response)
     elif inputs.patch is not None:
         fields = interface_fields.collect_interface_fields(
             model, run.numerics, inputs.patch, solution
         )
-    moved = ()
+    faces = ()
     if model.has_interface_patches:
-        snapshots = [
-            frame
-            for frame in solution.snapshots
-            if isinstance(frame, event_to_event.ElementSnapshot)
-        ]
-        moved = interface_fields.add_slip_fields(model, inputs.faces, snapshots)
+        snapshots = () if engine.has_steps else motion.snapshots
+        faces = interface_fields.add_slip_fields(model, inputs.faces, snapshots)
 
+    # The slide at an interface may exceed the overlap of its pieces.
+    outcome = run.outcome
+    for face in inputs.faces:
+        slide = face.slide(motion.response)
+        outcome = check_pieces_overlap(outcome, face.model.patch, face.patch, slide)
     return Result(
         plan=inputs.plan,
-        outcome=_find_final_outcome(run),
+        outcome=outcome,
         measures=measures,
         seconds=inputs.seconds,
         warnings=[*inputs.warnings, *warnings],
         notes=notes,
         patch=inputs.patch,
         fields=fields,
-        response=solution.response,
-        window=solution.response if model.rig is None else solution.window,
+        response=motion.response,
+        window=motion.response if rig is None else motion.window,
         settings=run.settings,
-        motion=_collect_motion(run),
-        faces=moved,
+        motion=data,
+        faces=faces,
     )
 
 
@@ -398,7 +409,7 @@ def estimate_slide_errors(model, patches, run: "bench.BenchRun", steps: int) -> 
         Source of the error, and errors by measure.
     """
     solution = slides.make_slide_solution(run)
-    numerics = make_bench_numerics(model, steps, run.engine)
+    numerics = replace(run.numerics, steps=steps)
     runs = comparisons.list_time_runs(numerics)
     runs += comparisons.list_space_runs(model, numerics, patches[0], len(patches) - 1, solution)
     return Runner(model, patches).estimate_errors(runs, solution)
@@ -430,16 +441,24 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
     runner = Runner(
         model, inputs.patches, inputs.stiffer, inputs.progress, is_single=not inputs.estimate
     )
-    first = runner.solve(numerics, inputs.say)
-    inputs.seconds.update({stage: first.seconds} | (first.prepare or {}))
+    n_frames = N_INTERFACE_FRAMES * (inputs.patch is not None or model.has_interface_patches)
+    first = runner.solve(numerics, inputs.say, n_frames)
+    inputs.seconds.update({stage: first.seconds} | first.prepare)
 
-    # On a belt, the window must contain a complete stick-slip period, which the first run shows.
-    n_cycles = 0 if rig is None else _count_slip_period_cycles(model, numerics, first)
-    if n_cycles > numerics.window:
+    # A belt moves on at constant speed, so that the drive has no period, but the stick-slip motion has one, which the first
+    # run shows. The window must contain a complete period, and the run two of them.
+    n_cycles = 0
+    drive = None if rig is None else rig.drive.signal
+    if rig is not None and model.friction is not None and drive.segments:
+        if not structure.drive_sizes.is_periodic(drive):
+            response = first.run.response
+            period = find_slip_period(response.time, response.slide_rate)
+            n_cycles = ceil(period / drive.period)
+    if numerics.window < n_cycles <= numerics.cycles / 2:
         numerics = replace(numerics, window=n_cycles)
-        first = runner.solve(numerics, inputs.say)
-    if not inputs.estimate or first.outcome is Outcome.NOT_CONVERGED:
-        measures = add_errors(first.values, size=size) | compute_peak_frequency(first)
+        first = runner.solve(numerics, inputs.say, n_frames)
+    if not inputs.estimate or first.run.outcome is Outcome.NOT_CONVERGED:
+        measures = add_errors(first.values, size=size) | _find_peak_frequency(first)
         return CoupledRun(inputs, numerics, first, measures), None
 
     # Comparison runs on coarser meshes, with other modes and with other joints; more steps do not repeat them.
@@ -456,7 +475,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
         if coarser is not None:
             # This run has twice the steps of the one before, with which it is compared.
             runner.solutions[coarser.numerics] = coarser.solution
-            solution = runner.solve(numerics, inputs.say)
+            solution = runner.solve(numerics, inputs.say, n_frames)
             inputs.seconds[stage] = solution.seconds
         time_runs = comparisons.list_time_runs(numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
@@ -464,30 +483,27 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
         measures = add_errors(
             solution.values, errors, min_relative_error=MIN_MOTION_RELATIVE_ERROR, size=size
         )
-        if solution.levels or runner.is_release:
-            coarser_runs = [*time_runs, *space_runs]
-            solution = _add_level_errors(solution, coarser_runs, runner.solutions)
-        return CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
+        run = CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
+        if solution.levels is None and not runner.is_release:
+            return run
+
+        # An entry without coarse runs is skipped if the errors of the levels already include it. Runs with another bond
+        # summation are not used for the errors of decay curves and onsets.
+        solved = runner.solutions
+        used_runs = [one for one in (*time_runs, *space_runs) if one.runs or not solution.steady]
+        pairs = []
+        for one in used_runs:
+            if one.runs and one.runs[0].choice is None:
+                pairs.append((solved[one.runs[0]], one.reference and solved[one.reference]))
+        if solution.levels is not None:
+            found = levels.add_level_errors(solution.levels, used_runs, solved)
+            solution = replace(solution, levels=found)
+        return replace(run, solution=solution, coarser=tuple(pairs))
 
     run, shortage = refine.refine(solve, numerics, _judge, inputs.limit)
     inputs.seconds["error"] = sum(solution.seconds for solution in runner.solutions.values())
-    peak = compute_peak_frequency(run.solution, runner.solutions.values())
+    peak = _find_peak_frequency(run.solution, runner.solutions.values())
     return replace(run, measures=run.measures | peak), shortage
-
-
-def _count_slip_period_cycles(model, numerics, solution) -> int:
-    """Return how many cycles the stick-slip motion on a belt takes to repeat; 0 if it does not.
-
-    A belt moves on at constant speed, so that the drive has no period, but the stick-slip motion has one. The cycles are
-    those of `drive.period`. The result is also 0 if the run is shorter than two periods of the motion. `model` has the
-    drive and the friction law, `numerics` the cycles of the run, and `solution` is its motion.
-    """
-    drive = model.rig.drive.signal
-    if model.friction is None or not drive.segments or structure.drive_sizes.is_periodic(drive):
-        return 0
-    response = solution.response
-    n_cycles = ceil(find_slip_period(response.time, response.slide_rate) / drive.period)
-    return n_cycles if 2 * n_cycles <= numerics.cycles else 0
 
 
 def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
@@ -498,29 +514,39 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     except in a run that takes little time (MAX_NODE_STEPS_FOR_OTHER_MEASURES).
     """
     numerics = run.numerics
-    max_passes = _count_finer_passes(run)
-    if not max_passes:
+    accuracy = run.model.accuracy
+    rig = run.model.rig
+    if rig is None:
+        # The steps of a prescribed slide are refined together with the meshes (`refine.judge_pass`).
         return refine.Verdict(0.0)
+
+    # How many times the run can be repeated with smaller steps than before
+    ledger = run.solution.run.ledger
+    if numerics.local:
+        max_passes = ceil(log(numerics.local / MIN_RELATIVE_STEP_ERROR, 100) - 1e-9)
+    else:
+        has_automatic_steps = ENGINES[numerics.engine].has_steps and not accuracy.steps_per_cycle
+        max_steps = min(MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS / numerics.cycles)
+        if not has_automatic_steps or run.solution.run.outcome in EARLY_OUTCOMES:
+            max_steps = numerics.steps
+        max_passes = floor(log2(max_steps / numerics.steps))
+    if max_passes <= 0:
+        return refine.Verdict(0.0)
+
     # Work of the run: steps times nodes, and more if each step presses the patch.
-    counters = run.solution.book
-    pressed = [face.patches[0] for face in run.inputs.faces]
-    nodes = max(
-        1.0,
-        *(patch.x.size for patch in pressed),
-        *(counters.get(name, 0.0) for name in ("points", "strips")),
-    )
-    work = numerics.steps * numerics.cycles * nodes
-    if run.model.rig.friction.load_varies and run.patch is not None:
+    counts = [face.patches[0].x.size for face in run.inputs.faces]
+    counts += [ledger.get("points", 0.0), ledger.get("strips", 0.0), 1.0]
+    work = numerics.steps * numerics.cycles * max(counts)
+    if rig.friction.load_varies and run.patch is not None:
         work *= PRESSING_STEP_WORK_RATIO
 
     # All measures count in a run that takes little time, else the main ones.
-    tolerance = run.model.accuracy.tolerance
-    measures = set_final_floors(complete_measures(run).measures, tolerance)
+    measures = set_final_floors(complete_measures(run).measures, accuracy.tolerance)
     if work > MAX_NODE_STEPS_FOR_OTHER_MEASURES:
         measures = {name: one for name, one in measures.items() if refine.is_main(name)}
     # The engine `hybrid` estimates the error of its steps itself.
     axis = "own" if numerics.local else "steps"
-    excess = refine.find_worst_measure(measures, tolerance, [axis]).excess
+    excess = refine.find_worst_measure(measures, accuracy.tolerance, [axis]).excess
     has_stalled = len(excesses) > 1 and excess >= excesses[-2]
     if not excess or has_stalled:
         return refine.Verdict(excess)
@@ -534,48 +560,24 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     )
 
 
-def _count_finer_passes(run: CoupledRun) -> int:
-    """Return how many times a run can be repeated with smaller steps than before."""
-    numerics = run.numerics
-    if run.model.rig is None:
-        return 0  # those of a prescribed slide are refined together with the meshes (`refine.judge_pass`)
-    if numerics.local:
-        return ceil(log(numerics.local / MIN_RELATIVE_STEP_ERROR, 100) - 1e-9)
-    if (
-        not ENGINES[numerics.engine].has_steps
-        or run.model.accuracy.steps_per_cycle is not None
-        or run.solution.outcome in EARLY_OUTCOMES
-    ):
-        return 0
-    max_steps = min(MAX_MARCH_STEPS_PER_CYCLE, MAX_REFINED_RUN_STEPS / numerics.cycles)
-    return max(0, floor(log2(max_steps / numerics.steps)))
+def _find_peak_frequency(solution: Solution, coarser=()) -> Measures:
+    """Return a dict with the frequency and the half-power width [Hz] of the peak of a response curve; {} without a curve.
 
-
-def _add_level_errors(
-    solution: Solution, coarser_runs: ComparisonRuns, solutions: dict[Numerics, Solution]
-) -> Solution:
-    """Add errors from coarse runs to the drive levels of a Solution.
-
-    Parameters
-    ----------
-    solution : Solution
-        Solution of the finest run.
-    coarser_runs : list of CoarserRuns
-        Settings of the coarse runs by source of error.
-    solutions : dict
-        Solution of each coarse run by its Numerics.
+    The frequency has no value if the amplitude is 0, and a curve that is not drawn has no width. The shift of the peaks of
+    `coarser` runs is part of the error.
     """
-    # An entry without coarse runs is skipped if the errors of the levels already include it.
-    used_runs = [kind for kind in coarser_runs if kind.runs or solution.errors is None]
-    pairs = []
-    for kind in used_runs:
-        # Runs with another bond summation are not used for the errors of decay curves and onsets.
-        if kind.runs and kind.runs[0].choice is None:
-            pairs.append((solutions[kind.runs[0]], kind.reference and solutions[kind.reference]))
-    level_results = ()
-    if solution.levels:
-        level_results = add_level_errors(solution.levels, used_runs, solutions)
-    return replace(solution, levels=level_results, coarser=tuple(pairs))
+    steady = solution.steady
+    if steady is None or np.isnan(steady.peak_error):
+        return {}
+    if np.isinf(steady.peak_error):
+        return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK_REASON)}
+    drives = [one.steady.drive for one in (solution, *coarser)]
+    peak, *others = [float(one.omega / (2 * np.pi)) for one in drives if one is not None]
+    shift = float(np.abs(np.array(others) - peak).max(initial=0.0))
+    error = steady.peak_error + convergence_error(shift)
+    measures = {"peak_frequency": Measure(peak, "Hz", error, 0.0)}
+    width = steady.data.width
+    return measures if width is None else measures | {"peak_width": width}
 
 
 # ---- completion
@@ -595,7 +597,7 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
         measures = remove_errors(measures)
     repeat = rig.count_repeat_cycles(model.point)
     outcome, steady = judge_outcome(
-        solution,
+        solution.run,
         measures,
         (model.accuracy.tolerance, structure.drive_sizes.find_decay_rate(rig.modes)),
         run.drive,
@@ -611,78 +613,16 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
     ):
         outcome = Outcome.GROWS
     # A growing motion has no final values, so the errors of its measures are unknown.
-    if outcome is Outcome.GROWS and solution.outcome is not Outcome.GROWS:
+    if outcome is Outcome.GROWS and solution.run.outcome is not Outcome.GROWS:
         measures = remove_errors(measures)
     # The motion is judged at the accelerometer, so that its steady amplitude is not that of a gauge.
     if rig.modes.gauge is None:
         measures |= steady
 
-    window = solution.window
+    window = solution.run.window
     is_rigid = run.has_friction and model.sticks_rigidly
     motion = (window, run.drive, repeat)
     measures |= reasons.find_invalid(measures, motion, outcome, is_rigid=is_rigid)
     other_modes = rig.first_mode.fraction_of_other_modes(window.modal)
     measures |= reasons.find_missing(measures, window, run.drive, run.has_friction, other_modes)
     return replace(run, outcome=outcome, measures=measures)
-
-
-def _add_decay_curve(run: CoupledRun) -> CoupledRun:
-    """Return a released run with its decay curve, including mesh errors.
-
-    A note says where the mesh error is unknown.
-    """
-    model = run.model
-    solution = run.solution
-    run = replace(run, decay=decays.compute_decay_curve(solution))
-    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
-    if run.decay is None or not has_partial_slip:
-        return run
-
-    # Below the slip of the first node, two meshes have the same decay, so that static loops give the mesh error.
-    decay = run.decay
-    coarse = run.inputs.coarse[0]
-    mesh_errors = decays.estimate_stuck_mode_mesh_errors(
-        decay.amplitude, decay.frequency[-1], model, run.patch, coarse, run.inputs.stiffer
-    )
-    frequency_error, damping_error = mesh_errors.errors
-    decay = decay._replace(
-        frequency_error=np.fmax(decay.frequency_error, frequency_error),
-        damping_error=np.fmax(decay.damping_error, damping_error),
-    )
-    if not mesh_errors.reason:
-        return replace(run, decay=decay)
-    coarser = comparisons.list_space_runs(
-        model, run.numerics, run.patch, run.inputs.n_coarse, solution
-    )
-    note = decays.describe_unknown_mesh_error(mesh_errors.reason, coarser)
-    return replace(run, decay=decay, notes=(note,))
-
-
-def _find_final_outcome(run: CoupledRun) -> Outcome:
-    """Return the outcome of a run, or LEAVES_CONTACT if the slide at an interface exceeds the overlap of its pieces."""
-    outcome = run.outcome
-    for face in run.inputs.faces:
-        slide = face.slide(run.solution.response)
-        outcome = check_pieces_overlap(outcome, face.model.patch, face.patch, slide)
-    return outcome
-
-
-def _collect_motion(run: CoupledRun) -> MotionData:
-    """Return what the Result states of a motion beside measures and histories, as MotionData."""
-    solution = run.solution
-    if run.model.rig is None:
-        return MotionData(step_runs=run.step_runs)
-    drive = run.model.rig.drive
-    spectra = None
-    if drive.waveform.is_random:
-        spectra = stationary.compute_spectra(solution.window, drive.signal)
-    return MotionData(
-        period=run.drive.period,
-        energies=solution.book,
-        step_runs=run.step_runs,
-        levels=convert_to_scene_units(run.model.rig, solution.levels),
-        events=solution.log,
-        decay=run.decay,
-        spectra=spectra,
-        steady=solution.periodic,
-    )

@@ -1,12 +1,12 @@
-"""Wear of a patch over many cycles, computed in jumps of many cycles each.
+"""Wear of a patch over many cycles: a loop of pressing, moving and wearing, in jumps of many cycles each.
 
 In: a model with [wear], its solved patch and the same patch on coarser meshes. Out: `WornPatch`.
 The state is saved after every jump. A run that continues from a saved state gives bitwise the same
 results as an uninterrupted run.
 """
 
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from time import process_time
@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
-from ...model.earlier_wear import interpolate_nodes
+from ...core import PatchfemError, array_dataclass, frozen_array
 from ...model.patch import PatchPiece
+from ...model.wear import interpolate_nodes
 from ...time_steps.checkpoint import RETRY_ADVICE, read_state, write_state
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
@@ -65,7 +65,7 @@ class WearMoment(NamedTuple):
     values: dict[str, float]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@array_dataclass
 class WornPatch:
     """Worn patch with its wear history, on the finest mesh and on coarser meshes.
 
@@ -94,18 +94,31 @@ class _UnboundedMotion(Exception):
     """Signal that the motion of a worn rig grows without bound, so that no cycle repeats and the wear ends."""
 
 
-class _SlipPathFunction:
-    """Callable that returns the slip path per cycle on a worn patch.
+class _Wear:
+    """Contact, motion and wear of a patch.
 
     A motion that does not depend on the wear is computed once, on the unworn patch. A run that
     continues from a saved state then gives bitwise the same results.
+
+    Parameters
+    ----------
+    model : Model
+        Unworn model with [wear].
+    patch : Patch
+        Unworn patch, solved on its finest mesh.
     """
 
     def __init__(self, model, patch):
         self.model = model
         self.patch = patch
-        self.frames = choose_frame_count(model.accuracy.tolerance)
-        self.same = (
+        self.problem = WearProblem(
+            _make_force_function(patch),
+            self.move,
+            patch.pieces.interface.weight,
+            model.wear.coefficient,
+            model.wear.cycles,
+        )
+        self.is_same_motion = (
             model.grooves is None
             and model.wear.friction is None
             and not bands_slide_independently(model)
@@ -113,16 +126,118 @@ class _SlipPathFunction:
         )
         self.last: CycleSlip | None = None
 
-    def __call__(self, worn) -> np.ndarray:
+    def move(self, worn) -> np.ndarray:
         """Return the slip path (m,) [m] per cycle at a worn depth [m]."""
-        if self.last is None or not self.same:
-            worn = np.zeros_like(worn) if self.same else worn
+        if self.last is None or not self.is_same_motion:
+            worn = np.zeros_like(worn) if self.is_same_motion else worn
             patch = solve_worn(self.patch, worn)
-            slip = compute_cycle_slip(make_worn_model(self.model, patch, worn), patch, self.frames)
+            n_frames = choose_frame_count(self.model.accuracy.tolerance)
+            slip = compute_cycle_slip(make_worn_model(self.model, patch, worn), patch, n_frames)
             if slip.outcome is not None:
                 raise _UnboundedMotion(slip.outcome.sentence)
             self.last = slip
         return self.last.path
+
+    def start(self) -> WearState:
+        """Return the state before the first jump, which has the worn depth of an earlier run.
+
+        Raises
+        ------
+        PatchfemError
+            If the earlier run had other surfaces, or wore through a coating.
+        """
+        earlier_run = self.model.wear.start
+        axes = _list_axes(self.patch)
+        if earlier_run is not None:
+            earlier_run.require_same_surfaces(axes, self.patch.unloaded_gap)
+        depth = self.model.wear.compute_earlier_depth(axes, self.problem.area)
+        if (coating := find_worn_through_coating(self.model, depth)) is not None:
+            raise PatchfemError(
+                f"{earlier_run.path}: in that run the coating of the {coating.name} piece was worn through; choose a "
+                "run in which this coating was not worn through",
+                "wear.start",
+            )
+        return make_initial_wear_state(self.problem, depth)
+
+    def jump(self, state: WearState) -> WearState:
+        """Return the state after the next jump, which ends early if a coating is worn through."""
+
+        def jump_to(cycle: float) -> WearState:
+            """Compute the state after a jump that ends at a given cycle or earlier."""
+            wear = self.model.wear
+            return take_jump(
+                self.problem, state, self.model.accuracy.tolerance, wear.jumps, until=cycle
+            )
+
+        def find_excess(cycle: float) -> float:
+            """Return the worn fraction of the coating that is most worn after a jump to a cycle, minus 1."""
+            end = state if cycle == state.cycle else jump_to(cycle)
+            return max(list_worn_pieces(self.model, end.depth)).fraction - 1
+
+        end = jump_to(self.find_next_table_row(state))
+        if max(list_worn_pieces(self.model, end.depth)).fraction <= 1 + WORN_THROUGH_FRACTION:
+            return end
+
+        # scipy.optimize takes half a second to import, and most runs never wear a coating through.
+        from scipy.optimize import brentq
+
+        # The wear rate changes little within a jump, so that the worn fraction is exact to WORN_THROUGH_FRACTION.
+        xtol = 0.1 * WORN_THROUGH_FRACTION * (end.cycle - state.cycle)
+        return jump_to(brentq(find_excess, state.cycle, end.cycle, xtol=xtol))
+
+    def find_next_table_row(self, state: WearState) -> float:
+        """Return the last cycle that a jump may reach without skipping a row of the friction table; inf without one.
+
+        At this cycle, with the present wear rate, the mean worn depth reaches the next row of the
+        table; or the row after it, if the next row is nearer than a tenth of their distance. A longer
+        jump would skip the values of a row.
+        """
+        wear = self.model.wear
+        depth = compute_mean_worn_depth(self.patch, state.depth)
+        rates = wear_rates(wear.coefficient, state.path, self.problem.area) * state.force
+        rate = compute_mean_worn_depth(self.patch, rates)
+        rows = []
+        if wear.friction is not None and not wear.jumps and rate > 0:
+            rows = [row for row in wear.friction.depth if row > depth]
+        if not rows:
+            return np.inf
+        is_near = len(rows) > 1 and rows[0] - depth < MIN_FRICTION_ROW_DISTANCE_RATIO * (
+            rows[1] - rows[0]
+        )
+        return state.cycle + (rows[is_near] - depth) / rate
+
+    def record(self, patch, state: WearState) -> WearMoment:
+        """Return contact, slip path and measures of the patch, solved with the worn depth of a state, as a WearMoment."""
+        worn = make_worn_model(self.model, patch, state.depth)
+        values = compute_values(patch) | self.last.values
+        values |= compute_worn_volume_and_depth(patch, state.depth)
+
+        # Wear changes the grooves and, by a table, the friction law.
+        if self.model.grooves is not None:
+            values["groove_amplitude"] = 0.0 if worn.grooves is None else worn.grooves.amplitude
+        if self.model.wear.friction is not None:
+            values["static_coefficient"] = worn.friction.static
+            if worn.friction.bond_length is not None:
+                values["bond_length"] = worn.friction.bond_length
+        pressed = patch.pressure
+        fields = (state.depth, state.jump_path, pressed.sigma_n, pressed.gap)
+        return WearMoment(state.cycle, *fields, self.last.error, values)
+
+    def replay(self, mesh, moments) -> tuple[Patch, np.ndarray]:
+        """Repeat the jumps of the run on the unworn patch of another mesh; return the worn patch and its depth [m].
+
+        The slip paths of the `moments` are interpolated.
+        """
+        areas = mesh.pieces.interface.weight
+        axes = _list_axes(mesh)
+        jumps = []
+        for before, after in pairwise(moments):
+            path = interpolate_nodes(_list_axes(self.patch), after.used, axes)
+            jumps.append((after.cycle - before.cycle, path))
+        wear = self.model.wear
+        depth = wear.compute_earlier_depth(axes, areas)
+        depth = replay_jumps(_make_force_function(mesh), areas, wear.coefficient, jumps, depth)
+        return solve_worn(mesh, frozen_array(depth)), depth
 
 
 def compute_mean_worn_depth(patch, depth) -> float:
@@ -157,11 +272,7 @@ def make_worn_model(model, patch, depth):
 
     # The friction of a rig is also that of its interface.
     law = wear.friction.compute_worn_law(model.friction, mean_depth)
-    rig = model.rig
-    if rig is not None:
-        interfaces = tuple(replace(face, numbers=law) for face in rig.friction.interfaces)
-        rig = replace(rig, friction=replace(rig.friction, interfaces=interfaces))
-    return replace(model, friction=law, rig=rig)
+    return replace(model, friction=law, rig=model.rig and model.rig.with_law(law))
 
 
 def compute_wear(
@@ -191,115 +302,59 @@ def compute_wear(
     WornPatch
     """
     clock = process_time()
-    patch_model = model.patch
     n_cycles = model.wear.cycles
-
-    motion = _SlipPathFunction(model, patch)
-    problem = WearProblem(
-        _make_force_function(patch),
-        motion,
-        patch.pieces.interface.weight,
-        model.wear.coefficient,
-        n_cycles,
-    )
+    wear = _Wear(model, patch)
+    state, moments = initial or (None, ())
 
     # A motion without bound has no slip path, so that no wear is computed for it.
-    state, moments = initial or (None, ())
     stop_reason = ""
     try:
-        if initial is None:
-            patch = _add_earlier_wear(model, patch)
-            earlier_depth = model.wear.compute_earlier_depth(_list_axes(patch), problem.area)
-            state = make_initial_wear_state(problem, earlier_depth)
-            moments = (_record_moment(patch, state, motion),)
+        if state is None:
+            state = wear.start()
+            if model.wear.start is not None:
+                patch = solve_worn(patch, frozen_array(state.depth))
+            moments = (wear.record(patch, state),)
         else:
             patch = solve_worn(patch, frozen_array(state.depth))
+        while state.cycle < n_cycles and find_worn_through_coating(model, state.depth) is None:
+            state = wear.jump(state)
+            patch = solve_worn(patch, frozen_array(state.depth))
+            moments = (*moments, wear.record(patch, state))
+            if store is not None:
+                store(state, moments)
+            if progress is not None:
+                progress(state.cycle / n_cycles)
     except _UnboundedMotion as reason:
         stop_reason = f"nothing was worn: {reason}"
-
-    # Jumps over many cycles, each with the contact solved on the worn gap.
-    while state is not None and state.cycle < n_cycles:
-        if find_worn_through_coating(model, state.depth) is not None:
-            break
-        try:
-            state = _take_next_jump(model, problem, state)
-        except _UnboundedMotion as reason:
+        if state is not None:
             stop_reason = (
                 f"wear was computed only up to cycle {state.cycle:.6g} of {n_cycles:.6g}: {reason}"
             )
-            break
-        patch = solve_worn(patch, frozen_array(state.depth))
-        moments = (*moments, _record_moment(patch, state, motion))
-        if store is not None:
-            store(state, moments)
-        if progress is not None:
-            progress(state.cycle / n_cycles)
 
     # The jumps are repeated on coarser meshes for the errors. Without any jump, this adds the wear of an earlier run.
-    replayed = []
-    for mesh in coarse:
-        if mesh is not None:
-            replayed.append(_replay_wear(model, patch, mesh, moments))
-
-    worn = (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None))
-    add_measures = with_static_measures if patch_model.area is None else area.with_face_measures
+    meshes = [mesh for mesh in coarse if mesh is not None]
+    replayed = [wear.replay(mesh, moments) for mesh in meshes]
+    worn = (*(worn for worn, _ in replayed), *[None] * (len(coarse) - len(meshes)))
+    add_measures = area.with_face_measures if model.patch.area else with_static_measures
     patch, *worn = add_measures((patch, *worn), model.accuracy.tolerance)
-    return WornPatch(
-        patch,
-        tuple(worn),
-        state,
-        moments,
-        tuple(depth for _, depth in replayed),
-        process_time() - clock,
-        stop_reason,
-    )
-
-
-class WornCoating(NamedTuple):
-    """Coating of a piece, with the fraction of its thickness that is worn off.
-
-    - fraction: worn fraction of the thickness at the deepest point.
-    - piece: "upper" or "lower".
-    - thickness: thickness of the coating [m].
-    """
-
-    fraction: float
-    piece: str
-    thickness: float
-
-
-def find_worn_through_coating(model, depth) -> WornCoating | None:
-    """Return the coating that is worn through at a worn depth, or None if there is none.
-
-    `depth` [m] is the worn depth of both pieces together (m,).
-    """
-    coating = _most_worn_coating(model, depth)
-    return coating if coating.fraction >= 1 - WORN_THROUGH_FRACTION else None
-
-
-def _most_worn_coating(model, depth) -> WornCoating:
-    """Return the coating with the largest worn fraction of its thickness.
-
-    The fraction is 0 if there are no coatings.
-    """
-    coatings = [WornCoating(0.0, "", 0.0)]
-    for piece, name, piece_depth in list_worn_pieces(model, depth):
-        if piece.coating is not None:
-            coatings.append(WornCoating(piece_depth / piece.thickness, name, piece.thickness))
-    return max(coatings)
+    depths = tuple(depth for _, depth in replayed)
+    seconds = process_time() - clock
+    return WornPatch(patch, tuple(worn), state, moments, depths, seconds, stop_reason)
 
 
 class WornPiece(NamedTuple):
     """Part of the wear that one piece of a patch has.
 
-    - piece: the piece.
+    - fraction: worn fraction of the thickness of its coating at the deepest point; 0 without a coating.
     - name: "upper" or "lower".
     - depth: largest depth that is worn off it [m].
+    - piece: the piece.
     """
 
-    piece: PatchPiece
+    fraction: float
     name: str
     depth: float
+    piece: PatchPiece
 
 
 def list_worn_pieces(model, depth) -> list[WornPiece]:
@@ -309,111 +364,28 @@ def list_worn_pieces(model, depth) -> list[WornPiece]:
     """
     largest = float(depth.max(initial=0.0))
     share = model.wear.upper_share
-    pieces = model.patch.pieces
-    return [
-        WornPiece(pieces.upper, "upper", share * largest),
-        WornPiece(pieces.lower, "lower", (1 - share) * largest),
-    ]
+    worn = []
+    for name, own_share in (("upper", share), ("lower", 1 - share)):
+        piece = getattr(model.patch.pieces, name)
+        own_depth = own_share * largest
+        fraction = own_depth / piece.thickness if piece.coating is not None else 0.0
+        worn.append(WornPiece(fraction, name, own_depth, piece))
+    return worn
 
 
-def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
-    """Compute the state after the next jump, which ends early if a coating is worn through.
+def find_worn_through_coating(model, depth) -> WornPiece | None:
+    """Return the piece whose coating is worn through at a worn depth, or None if there is none.
 
-    `model` has the wear and the accuracy, `problem` the contact and the coefficient, and `state` the worn depth and the
-    cycle before the jump.
+    `depth` [m] is the worn depth of both pieces together (m,).
     """
-
-    def jump_to(cycle: float) -> WearState:
-        """Compute the state after a jump that ends at a given cycle or earlier."""
-        return take_jump(problem, state, model.accuracy.tolerance, model.wear.jumps, until=cycle)
-
-    def find_excess(cycle: float) -> float:
-        """Return the worn fraction of the coating that is most worn after a jump to a cycle, minus 1."""
-        end = state if cycle == state.cycle else jump_to(cycle)
-        return _most_worn_coating(model, end.depth).fraction - 1
-
-    next_state = jump_to(find_cycle_of_next_table_row(model.wear, problem, state))
-    if _most_worn_coating(model, next_state.depth).fraction <= 1 + WORN_THROUGH_FRACTION:
-        return next_state
-
-    # scipy.optimize takes half a second to import, and most runs never wear a coating through.
-    from scipy.optimize import brentq
-
-    # The wear rate changes little within a jump, so that the worn fraction is exact to WORN_THROUGH_FRACTION.
-    length = next_state.cycle - state.cycle
-    cycle = brentq(
-        find_excess, state.cycle, next_state.cycle, xtol=0.1 * WORN_THROUGH_FRACTION * length
-    )
-    return jump_to(cycle)
-
-
-def find_cycle_of_next_table_row(wear, problem: WearProblem, state: WearState) -> float:
-    """Return the last cycle that a jump may reach without skipping a row of the friction table.
-
-    At this cycle, with the present wear rate, the mean worn depth reaches the next row of the
-    table; or the row after it, if the next row is nearer than a tenth of their distance. A longer
-    jump would skip the values of a row.
-
-    Parameters
-    ----------
-    wear
-        Wear parameters of the model.
-    problem : WearProblem
-        Contact, slip path and wear law.
-    state : WearState
-        State at the start of the jump.
-
-    Returns
-    -------
-    float
-        inf if there is no further row.
-    """
-    if wear.friction is None or wear.jumps:
-        return np.inf
-    weight = problem.area / problem.area.sum()
-    depth = float(np.vdot(state.depth, weight))
-    rows = [row for row in wear.friction.depth if row > depth]
-    if not rows:
-        return np.inf
-    is_near = len(rows) > 1 and rows[0] - depth < MIN_FRICTION_ROW_DISTANCE_RATIO * (
-        rows[1] - rows[0]
-    )
-    rates = wear_rates(problem.coefficient, state.path, problem.area) * state.force
-    rate = float(np.vdot(rates, weight))
-    if rate <= 0:
-        return np.inf
-    return state.cycle + (rows[is_near] - depth) / rate
+    most_worn = max(list_worn_pieces(model, depth))
+    return most_worn if most_worn.fraction >= 1 - WORN_THROUGH_FRACTION else None
 
 
 def _list_axes(patch) -> tuple[np.ndarray, ...]:
     """Return the positions [m] of the nodes of a patch, (x,), or of the rows and columns of cells of a face, (y, x)."""
     cells = patch.pieces.normal
     return (patch.x,) if patch.model.area is None else (cells.y, cells.x)
-
-
-def _add_earlier_wear(model, patch):
-    """Return the patch with the worn depth of an earlier run added to its gap.
-
-    It is unchanged without an earlier run.
-
-    Raises
-    ------
-    PatchfemError
-        If the earlier run had other surfaces, or wore through a coating.
-    """
-    earlier_run = model.wear.start
-    if earlier_run is None:
-        return patch
-    axes = _list_axes(patch)
-    earlier_run.require_same_surfaces(axes, patch.unloaded_gap)
-    depth = frozen_array(earlier_run.depth_at(axes))
-    if (coating := find_worn_through_coating(model, depth)) is not None:
-        raise PatchfemError(
-            f"{earlier_run.path}: in that run the coating of the {coating.piece} piece was worn through; choose a "
-            "run in which this coating was not worn through",
-            "wear.start",
-        )
-    return solve_worn(patch, depth)
 
 
 def solve_worn(patch, worn):
@@ -430,41 +402,11 @@ def compute_values(patch) -> Values:
     return compute_static_values(patch)
 
 
-def _make_force_function(patch):
+def _make_force_function(patch) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     """Return a function of worn depth and softening that computes the contact forces [N] (`wear.depth.Press`)."""
     if patch.model.area is not None:
         return area.make_force_function(patch)
     return make_contact_force_function(patch.model, patch.pair)
-
-
-def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMoment:
-    """Return contact, slip path and measures of a worn patch as a WearMoment.
-
-    `patch` is solved with the worn depth of `state`, and `motion` is the function that computed the last slip path, with
-    its measures.
-    """
-    model = motion.model
-    worn = make_worn_model(model, patch, state.depth)
-    measures = compute_values(patch) | motion.last.values
-    measures |= compute_worn_volume_and_depth(patch, state.depth)
-
-    # Wear changes the grooves and, by a table, the friction law.
-    if model.grooves is not None:
-        measures["groove_amplitude"] = 0.0 if worn.grooves is None else worn.grooves.amplitude
-    if model.wear.friction is not None:
-        measures["static_coefficient"] = worn.friction.static
-        if worn.friction.bond_length is not None:
-            measures["bond_length"] = worn.friction.bond_length
-
-    return WearMoment(
-        state.cycle,
-        state.depth,
-        state.jump_path,
-        patch.pressure.sigma_n,
-        patch.pressure.gap,
-        motion.last.error,
-        measures,
-    )
 
 
 def compute_worn_volume_and_depth(patch, depth) -> Values:
@@ -473,65 +415,6 @@ def compute_worn_volume_and_depth(patch, depth) -> Values:
         "worn_volume": float(np.vdot(depth, patch.pieces.interface.weight)),
         "worn_depth_max": float(depth.max(initial=0.0)),
     }
-
-
-def _replay_wear(model, patch, other_patch, moments) -> tuple[Patch, np.ndarray]:
-    """Repeat the jumps of a run on another mesh.
-
-    The slip paths are interpolated. Returns the worn patch and its worn depth [m].
-
-    Parameters
-    ----------
-    model : Model
-        Model of the run.
-    patch, other_patch : Patch
-        Patch of the moments, and the unworn patch on the other mesh.
-    moments : sequence of WearMoment
-        States after each jump of the run.
-    """
-    areas = other_patch.pieces.interface.weight
-    axes = _list_axes(patch)
-    others = _list_axes(other_patch)
-
-    # Cycles of each jump, and the slip path with which the run wore the patch
-    jumps = []
-    for before, after in pairwise(moments):
-        path = interpolate_nodes(axes, after.used, others)
-        jumps.append((after.cycle - before.cycle, path))
-    depth = replay_jumps(
-        _make_force_function(other_patch),
-        areas,
-        model.wear.coefficient,
-        jumps,
-        model.wear.compute_earlier_depth(others, areas),
-    )
-    return solve_worn(other_patch, frozen_array(depth)), depth
-
-
-def compute_and_save_wear(storage, key: str, model, patch, coarse, progress=None) -> WornPatch:
-    """Compute the wear of a patch and save its state after each jump.
-
-    Parameters
-    ----------
-    storage
-        File of the state, as `run.StateFile`; None: the state is not saved.
-    key : str
-        Hash of scene and version, which a saved state must match.
-    model : Model
-        Unworn model with [wear].
-    patch : Patch
-        Unworn patch.
-    coarse : sequence of Patch or None
-        The unworn patch on coarser meshes; None for a missing one.
-    progress : callable, optional
-        Called with the completed fraction of the cycles.
-    """
-    if storage is None:
-        return compute_wear(model, patch, coarse, progress)
-    initial = load_wear_state(storage.path, key) if storage.resume else None
-    return compute_wear(
-        model, patch, coarse, progress, initial, partial(save_wear_state, storage.path, key)
-    )
 
 
 def save_wear_state(

@@ -52,16 +52,17 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
         Whether to estimate the errors.
     """
     model = result.plan.model
+    is_unbounded = result.outcome in UNBOUNDED_OUTCOMES
 
     # A single point has no surface that could change: only its worn volume is computed, after the run.
     if evolved is None:
-        if result.outcome in UNBOUNDED_OUTCOMES:
+        if is_unbounded:
             warning = f"nothing was worn: {result.outcome.sentence}"
             return replace(result, warnings=[*result.warnings, warning])
         volume = _measure_point_volume(model, result, with_errors=with_errors)
         return replace(result, measures=result.measures | volume)
 
-    warnings = [*result.warnings, *([evolved.stopped] if evolved.stopped else [])]
+    warnings = [*result.warnings, *filter(None, [evolved.stopped])]
     result = replace(result, seconds=result.seconds | {"wear": evolved.seconds}, warnings=warnings)
     if evolved.state is None:
         return result
@@ -70,39 +71,30 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
     worn = _measure_patch_wear(model, evolved, result.measures, with_errors=with_errors)
     if model.wear.friction is not None:
         worn |= _measure_worn_friction(model, evolved, result.measures, worn["worn_volume"].error)
-    worn |= _measure_worn_through_cycle(model, evolved, worn["worn_depth_max"].error)
     if with_errors:
         result = _widen_errors_by_jumps(result, evolved)
-    result = _add_wear_frames(replace(result, measures=result.measures | worn), evolved)
 
     # A run that continues an earlier one, or wears through a coating, says so.
-    notes = list(result.notes)
-    if model.patch.gap.is_split:
-        notes.append(SPLIT_TRACE_NOTE)
+    notes = [*result.notes, *[SPLIT_TRACE_NOTE] * model.patch.gap.is_split]
     if model.wear.start is not None:
         notes.append(model.wear.start.sentence)
-    if "worn_through_cycle" in worn:
-        notes += _note_on_worn_through_coating(model, evolved)
-        if result.outcome not in UNBOUNDED_OUTCOMES:
-            result = replace(result, outcome=Outcome.WORN_THROUGH)
-    return replace(
-        result,
-        warnings=[
-            *warnings,
-            *_warn_of_worn_depth(model, evolved),
-            *_warn_of_friction_table(model, evolved),
-        ],
-        notes=notes,
-    )
+    outcome = result.outcome
+    coating = find_worn_through_coating(model, evolved.state.depth)
+    if coating is not None:
+        worn |= _measure_worn_through_cycle(evolved, worn["worn_depth_max"].error)
+        notes.append(_describe_worn_through_coating(model, evolved, coating))
+        outcome = outcome if is_unbounded else Outcome.WORN_THROUGH
+    warnings += [*_warn_of_worn_depth(model, evolved), *_warn_of_friction_table(model, evolved)]
+    measures = result.measures | worn
+    result = replace(result, outcome=outcome, measures=measures, warnings=warnings, notes=notes)
+    return _add_wear_frames(result, evolved)
 
 
-def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures:
-    """Return a dict with the cycle in which the wear first reaches the substrate, if it does.
+def _measure_worn_through_cycle(evolved, error: float | None) -> Measures:
+    """Return a dict with the cycle in which the wear first reaches the substrate.
 
     `evolved` is the result of the jumps with their moments, and `error` [m] that of the largest worn depth.
     """
-    if find_worn_through_coating(model, evolved.state.depth) is None:
-        return {}
     before, last = evolved.moments[-2:]
     deepest = int(np.argmax(last.depth))
     depth = float(last.depth.flat[deepest])
@@ -112,23 +104,22 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> Measures
     return {name: make_measure(name, last.cycle, cycle_error)}
 
 
-def _note_on_worn_through_coating(model, evolved) -> list[str]:
+def _describe_worn_through_coating(model, evolved, coating) -> str:
     """Return the note on the coating that is worn through and on the place of the deepest wear.
 
-    `evolved` is the `WornPatch` at the end of the wear.
+    `evolved` is the `WornPatch` at the end of the wear, and `coating` the `WornPiece` with the coating.
     """
-    depth = evolved.state.depth
-    coating = find_worn_through_coating(model, depth)
-    node = int(np.argmax(depth))
-    place = f"x = {format_length(float(evolved.patch.x[node]), 3)}"
+    patch = evolved.patch
+    node = int(np.argmax(evolved.state.depth))
+    place = f"x = {format_length(float(patch.x[node]), 3)}"
     if model.patch.area is not None:
-        place += f", y = {format_length(float(evolved.patch.y[node]), 3)}"
-    return [
-        f"the coating of the {coating.piece} piece, {format_length(coating.thickness)}, is worn through at {place} after "
-        f"{format_number(evolved.state.cycle, 4)} of {format_number(model.wear.cycles, 7)} cycles; "
-        "the measures are those of the "
-        "patch at that cycle"
-    ]
+        place += f", y = {format_length(float(patch.y[node]), 3)}"
+    thickness = format_length(coating.piece.thickness)
+    return (
+        f"the coating of the {coating.name} piece, {thickness}, is worn through at {place} after "
+        f"{format_number(evolved.state.cycle, 4)} of {format_number(model.wear.cycles, 7)} cycles; the measures are those "
+        "of the patch at that cycle"
+    )
 
 
 def _widen_errors_by_jumps(result, evolved):
@@ -162,11 +153,11 @@ def _warn_of_worn_depth(model, evolved) -> list[str]:
     `evolved` is the `WornPatch` at the end of the wear.
     """
     warnings = []
-    for piece, name, depth in list_worn_pieces(model, evolved.state.depth):
-        if depth > MAX_WORN_THICKNESS_FRACTION * (piece.thickness or piece.height):
-            size = "its height" if piece.coating is None else "the thickness of its coating"
+    for worn in list_worn_pieces(model, evolved.state.depth):
+        size = "the thickness of its coating" if worn.piece.coating else "its height"
+        if worn.depth > MAX_WORN_THICKNESS_FRACTION * (worn.piece.thickness or worn.piece.height):
             warnings.append(
-                f"up to {format_length(depth, 3)} is worn off the {name} piece, more than 0.2 of {size}, but the "
+                f"up to {format_length(worn.depth, 3)} is worn off the {worn.name} piece, more than 0.2 of {size}, but the "
                 "computation still uses the stiffness of the unworn piece"
             )
     return warnings
@@ -200,46 +191,39 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool =
     state = evolved.state
     first = evolved.moments[0]
     last = evolved.moments[-1]
-    area = evolved.patch.pieces.interface.weight
+    weight = evolved.patch.pieces.interface.weight
+    area = float(weight.sum())
     slip_error = last.miss + _relative_slip_error(motion) + _relative_slip_change(last, motion)
+    changes = np.abs(state.depth - state.coarse_depth)
     jump_errors = {
-        "worn_volume": float(np.vdot(np.abs(state.depth - state.coarse_depth), area))
-        + state.path_error * float(area.sum()),
+        "worn_volume": float(np.vdot(changes, weight)) + state.path_error * area,
         "worn_depth_max": state.error,
     }
 
-    # Values on the coarser meshes, for the errors.
+    # Values on the coarser meshes, for the errors; a single mesh shows no error.
     values = {name: last.values[name] for name in jump_errors}
-    coarse = []
-    for patch, depth in zip(evolved.coarse, evolved.depths):
-        coarse.append(compute_worn_volume_and_depth(patch, depth))
+    meshes = zip(evolved.coarse, evolved.depths)
+    coarse = [compute_worn_volume_and_depth(*mesh) for mesh in meshes] if with_errors else []
     mesh_errors = estimate_convergence_errors(values, *coarse) if coarse else {}
 
     # The errors of jumps, slip path, mesh, round-off and earlier run add up.
     start = model.wear.start
     measures = {}
     for name, value in values.items():
-        error = None
-        worn_before = first.values[name]
-        start_error = 0.0 if start is None else start.measure_error(name, worn_before)
-        has_error = coarse and with_errors
-        if has_error and start_error is not None:
-            error = (
-                jump_errors[name]
-                + slip_error * max(value - worn_before, 0.0)
-                + float(mesh_errors[name])
-                + WORN_ROUND_OFF * value
-                + start_error
-            )
+        before = first.values[name]
+        error = 0.0 if start is None else start.measure_error(name, before)
+        if not coarse:
+            error = None
+        if error is not None:
+            error += jump_errors[name] + slip_error * max(value - before, 0.0)
+            error += float(mesh_errors[name]) + WORN_ROUND_OFF * value
         measures[name] = make_measure(name, value, error, WORN_SOURCE)
 
-    amplitude = last.values.get("groove_amplitude")
-    if amplitude is not None:
+    name = "groove_amplitude"
+    if name in last.values:
         error = measures["worn_volume"].error
-        error = None if error is None else error / float(area.sum())
-        measures["groove_amplitude"] = make_measure(
-            "groove_amplitude", amplitude, error, WORN_SOURCE
-        )
+        error = None if error is None else error / area
+        measures[name] = make_measure(name, last.values[name], error, WORN_SOURCE)
     return measures
 
 

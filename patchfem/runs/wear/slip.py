@@ -15,10 +15,11 @@ from ...core import Measure, Outcome
 from ...response.outcome import judge_outcome
 from ...response.rows import AMPLITUDE
 from ..bench.slides import integrate_steps
+from ..interfaces import bands
 from ..results.interfaces import check_pieces_overlap
 from ..results.patch_rows import Values
 from ..results.result import UNBOUNDED_OUTCOMES
-from ..rig import bands, engines, fields, rig, slides
+from ..rig import engines, fields, rig, slides
 
 MIN_CYCLE_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
@@ -153,14 +154,14 @@ def compute_cycle_slip(model, patch, n_cycle_frames: int) -> CycleSlip:
         n_frames *= max(1, round(model.slide.cycles or 1))
     settings = engines.choose_numerics(model)
     solution = rig.solve_rig(model, settings, patch, n_frames)
-    cycle = _select_last_cycle(model, solution.window, patch.pressure.load)
+    cycle = _select_last_cycle(model, solution.run.window, patch.pressure.load)
 
     # The slip follows from the histories if it is uniform, else from the frames of the cycle.
     if n_frames:
         nodes = _collect_nodes(model, settings, patch, solution)
         path, error = _integrate_node_slip(model, patch, nodes)
     elif bands_slide_independently(model):
-        path, error = _integrate_band_slip(model, patch, solution.window, cycle)
+        path, error = _integrate_band_slip(model, patch, solution.run.window, cycle)
     else:
         path, error = _integrate_uniform_slip(model, cycle)
         path = np.full(patch.pieces.interface.weight.shape, path)
@@ -168,7 +169,7 @@ def compute_cycle_slip(model, patch, n_cycle_frames: int) -> CycleSlip:
     if model.rig is not None:
         error += _slip_amplitude_change(solution.values, cycle)
         outcome = _find_unbounded_outcome(model, solution)
-    outcome = check_pieces_overlap(outcome, model.patch, patch, solution.response.slide)
+    outcome = check_pieces_overlap(outcome, model.patch, patch, solution.run.response.slide)
     return CycleSlip(path, error, solution.values, outcome)
 
 
@@ -197,7 +198,7 @@ def _find_unbounded_outcome(model, solution) -> Outcome | None:
     """Return the outcome of a motion of a rig without bound, which has no slip path; None for any other motion."""
     amplitude = Measure(solution.values[AMPLITUDE], "m", 0.0)
     outcome, _ = judge_outcome(
-        solution,
+        solution.run,
         {AMPLITUDE: amplitude},
         (model.accuracy.tolerance, 0.0),
         model.rig.drive.signal,
@@ -220,7 +221,7 @@ def _collect_nodes(model, settings, patch, solution) -> _Cycle:
     solution : Solution
         Motion with its frames.
     """
-    response = solution.response
+    response = solution.run.response
     sigma = patch.pressure.sigma_n
     is_rig = model.rig is not None
     if is_rig:
@@ -286,7 +287,7 @@ def _count_path_cycles(model, window) -> int:
     if model.rig is None:
         return 1
     repeat = model.rig.count_repeat_cycles(model.point) or 1.0
-    n_cycles = round((window.time[-1] - window.time[0]) / model.rig.drive.signal.period)
+    n_cycles = round(window.span / model.rig.drive.signal.period)
     return max(1, min(round(repeat), n_cycles))
 
 

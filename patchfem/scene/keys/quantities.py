@@ -30,6 +30,9 @@ _DECIMAL_COMMA_PATTERN = re.compile(r"[+-]?[0-9]+,[0-9]+")
 # Largest length of a quantity; a longer string is refused without being parsed.
 _MAX_CHARACTERS = 100
 _MAX_SHOWN_CHARACTERS = 60  # largest length of a wrong quantity in a message
+MAX_RANGE_VALUES = (
+    1000  # largest number of values of a range in a scene, far more than a test has levels
+)
 # Decimal context that holds all digits of the product of a value and a factor.
 _EXACT_CONTEXT = Context(prec=2 * _MAX_CHARACTERS, Emax=MAX_EMAX, Emin=MIN_EMIN)
 
@@ -81,6 +84,21 @@ def format_si(value: float, kind: str) -> str:
     `kind` is the kind of quantity, such as "length".
     """
     return f"{float(value)!r} {find_si_unit(kind)}"
+
+
+def spread_range(text: str, kind: str) -> list[str]:
+    """Return the values of a range with equal steps, such as "2 g..6 g:5", with their SI units.
+
+    `kind` is the kind of quantity. ValueError is raised if the number of values is missing or an end is no quantity.
+    """
+    ends, _, count = text.rpartition(":")
+    if not count.strip().isdigit() or not 2 <= int(count) <= MAX_RANGE_VALUES:
+        raise ValueError(
+            f"{text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
+        )
+    low, high = (parse_quantity(end.strip(), kind) for end in ends.split("..", 1))
+    parts = (k / (int(count) - 1) for k in range(int(count)))
+    return [format_si(low * (1 - part) + high * part, kind) for part in parts]
 
 
 def describe_requirement(kind: str) -> str:

@@ -13,7 +13,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from ...effects import LAWS, MAX_RIG_COORDINATES, WAVEFORMS
 from .accuracy import Accuracy
 from .contact import Contact, Grooves
-from .quantities import format_si, parse_quantity
+from .quantities import format_si, parse_quantity, spread_range
 from .types import (
     MAX_MAGNITUDE,
     AbsoluteTemperature,
@@ -494,8 +494,8 @@ class Drive(Table):
     )
     levels: optional(
         array(quantity("acceleration", ge=0)),
-        "amplitudes of the base acceleration, or of the force with kind 'force', applied one after the other; "
-        "each level starts from the final state of the previous level",
+        "amplitudes of the base acceleration, or of the force with kind 'force', applied one after the other, also as a "
+        "range of equal steps, such as `2 g..6 g:5`; each level starts from the final state of the previous level",
     )
     frequencies: optional(
         array(Frequency, least=2, most=100),
@@ -544,12 +544,15 @@ class Drive(Table):
 
     @field_validator("levels", mode="before")
     @classmethod
-    def _read_forces(cls, value: TomlValue, info: ValidationInfo) -> TomlValue:
-        """Read the levels of a force drive: write each force in SI as if it were an acceleration.
+    def _read_levels(cls, value: TomlValue, info: ValidationInfo) -> TomlValue:
+        """Read a range of levels, and write each level of a force drive in SI as if it were an acceleration.
 
-        `value` are the levels as written. `info` has the keys before this one, among them the kind of drive. Levels of
-        other drives are returned unchanged.
+        `value` are the levels as written. `info` has the keys before this one, among them the kind of drive.
         """
+        if isinstance(value, str) and ".." in value:
+            value = spread_range(
+                value, "force" if info.data.get("kind") == "force" else "acceleration"
+            )
         if info.data.get("kind") != "force" or not isinstance(value, list | tuple):
             return value
         forces = [parse_quantity(level, "force") for level in value]

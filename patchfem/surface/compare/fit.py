@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ...core import max_abs
 from .depth_map import UNWORN_LIMIT_DEVIATIONS
 from .model import Model
 from .statistics import (
@@ -86,7 +87,7 @@ def fit_unworn(model: Model, state, free: list[int], digit: float) -> Fit:
             change = solve_biweight_step(depth, jacobian, sigma, worn)
             state = state.copy()
             state[free] += change
-            if np.abs(jacobian @ change).max() < BIWEIGHT_STEP_TOL * sigma:
+            if max_abs(jacobian @ change) < BIWEIGHT_STEP_TOL * sigma:
                 break
         fit = evaluate(model, state, free, digit, worn)
         if (fit.worn == worn).all() or (~fit.worn).sum() < MIN_UNWORN_HEIGHTS:

@@ -6,6 +6,7 @@ the first trace was measured at another place and shows the roughness only.
 
 import numpy as np
 
+from ...core import max_abs
 from ..profile import find_runs
 from .changes import MIN_SHALLOW_TRACK_PARTS, N_TRACE_PARTS, make_boxes
 from .depth_map import DepthMap
@@ -58,10 +59,7 @@ def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
     boxes = make_boxes(1, MIN_FLANK_PARTS, MIN_SHALLOW_TRACK_PARTS)
     heights = -boxes.shapes @ means
     best = int(np.argmax(heights))
-    if (
-        heights[best]
-        <= MIN_TRACK_OVER_CHANCE_HEIGHT * np.abs(boxes.shapes @ np.array(others).T).max()
-    ):
+    if heights[best] <= MIN_TRACK_OVER_CHANCE_HEIGHT * max_abs(boxes.shapes @ np.array(others).T):
         return None
 
     # The flanks keep a part of distance from the box, whose ends are known to one part.

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError
+from ...core import PatchfemError, max_abs
 from ..areal import Areal, fill_nearest, find_scan_spikes
 from ..profile import MAX_TRACE_SAMPLES, Profile, remove_spikes
 
@@ -113,7 +113,7 @@ def make_raster(surface: Profile | Areal) -> Raster:
     median = float(np.median(distances))
     step = np.ptp(x) / round(np.ptp(x) / median)
     places = (x - x[0]) / step
-    if np.abs(places - np.rint(places)).max() > MAX_SAMPLE_UNEVENNESS:
+    if max_abs(places - np.rint(places)) > MAX_SAMPLE_UNEVENNESS:
         step = max(float(np.percentile(distances, 10)), np.ptp(x) / MAX_TRACE_SAMPLES)
     grid = x[0] + step * np.arange(int(np.ptp(x) / step * (1 + 1e-9)) + 1)
     z = np.interp(grid, x, surface.z[known])

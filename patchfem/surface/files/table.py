@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
+from ...core import PatchfemError, frozen_array, max_abs
 from ...formatting import format_length
 from ...inputs.damage import shorten
 from ..areal import Areal
@@ -261,7 +261,7 @@ def _undo_rounding(table: Table, coordinate: str, x) -> tuple[Table, np.ndarray]
     if gaps.size and gaps[0] > digit:
         digit = float(gaps[0])
         n_digits = np.diff(x) / digit
-        if np.abs(n_digits - np.rint(n_digits)).max() > STEP_DIGIT_TOL:
+        if max_abs(n_digits - np.rint(n_digits)) > STEP_DIGIT_TOL:
             return table, x
 
     # Candidates for even positions: by the length in the header over n or n - 1 steps, and by regression
@@ -273,7 +273,7 @@ def _undo_rounding(table: Table, coordinate: str, x) -> tuple[Table, np.ndarray]
 
     # The first candidate from which the positions differ by rounding alone
     for even in evens:
-        distance = float(np.abs(x - even).max())
+        distance = max_abs(x - even)
         step = float(even[1] - even[0])
         if step > 0 and distance <= MAX_ROUNDING_IN_DIGITS * digit:
             if distance <= EVEN_POSITIONS_TOL * step:

@@ -13,8 +13,8 @@ from scene_texts import DRIVE, KILOGRAM
 from patchfem import build
 from patchfem.friction import Bonds
 from patchfem.runs import choose_numerics as settings_of
-from patchfem.runs.rig.bond_lists import choose_bond_summation
-from patchfem.runs.rig.contact_points import make_contact
+from patchfem.runs.interfaces.bond_lists import choose_bond_summation
+from patchfem.runs.interfaces.contact_points import make_contact
 from patchfem.scene import scene
 
 TEXT = (

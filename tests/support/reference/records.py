@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from patchfem.export import quantities
 from patchfem.export import surface_definitions as definitions
 from patchfem.response.rows import MOTION_MEASURE_ROWS as MOTION
-from patchfem.runs.results.patch_rows import PATCH_MEASURE_ROWS as STATIC
+from patchfem.runs.results.patch_rows import PATCH_TABLE
 from patchfem.scene import MATERIALS
 
 from .keys import FOLDER, format_table
@@ -69,7 +69,7 @@ that of a group of pairs."""
         """Return the page."""
         static_rows, motion_rows = (
             [(f"`{row.name}`", row.unit, _format_floor(row), row.text) for row in rows]
-            for rows in (STATIC, MOTION)
+            for rows in (PATCH_TABLE.values(), MOTION)
         )
         head = ("measure", "unit", "floor", "meaning")
         surface_names = [
@@ -107,11 +107,10 @@ def _format_definitions(names: Iterable[str], kind: str) -> str:
 
 def _format_floor(row) -> str:
     """Return the floor of a row, with its relative part if it has one."""
-    if row.larger_term is None:
+    if not row.larger_term:
         return f"{row.floor:g}"
-    return f"{row.floor:g}; tolerance" + (
-        f" × {row.larger_term[0]}" if row.larger_term[0] != "1" else ""
-    )
+    term = f" × {row.larger_term}" * (row.larger_term != "1")
+    return f"{row.floor:g}; tolerance{term}"
 
 
 class MaterialsPage:

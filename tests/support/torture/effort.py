@@ -1,7 +1,7 @@
 """Rough computing time of a scene, by which expensive random scenes are left out."""
 
 from patchfem.runs import choose_numerics
-from patchfem.runs.rig.bond_lists import has_bond_list, is_stuck_by_printed_law
+from patchfem.runs.interfaces.bond_lists import has_bond_list, is_stuck_by_printed_law
 
 NODE_SECONDS = 4e-5  # CPU time [s] per elastic unknown of the finest mesh
 LIST_STRIP_STEP_SECONDS = 2e-6  # CPU time [s] per time step and strip of a list of bonds

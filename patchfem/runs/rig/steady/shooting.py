@@ -5,6 +5,7 @@ multipliers and stability, and the largest motion of a response curve over frequ
 where it may have some (`hybrid.periodic_curves`).
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from time import process_time
@@ -22,14 +23,14 @@ from ....hybrid.periodic_curves import (
     PathSettings,
     measure_distance,
 )
-from ....hybrid.records import Probe, Status, Window
+from ....hybrid.records import Face, Probe, Setting, Status, Window
 from ....response.measures import Values
-from ....response.rows import AMPLITUDE
+from ....response.rows import AMPLITUDE, select_names
 from ....response.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
-from ...results.result import Settings, SteadyData
+from ...results.result import SteadyData
 from ..engines import enlarge_hybrid_steps, estimate_hybrid_errors, may_fold
-from ..evaluation import Solution
+from ..evaluation import Solution, SteadyPart
 from ..event_to_event import LumpedEvaluator
 from ..joints import make_joints
 from .curves import (
@@ -62,6 +63,10 @@ FREQUENCY_PATH = PathSettings(first_step=0.0125, max_step=0.05)
 WEAK_DRIVE = 1e-2
 MAX_LEVEL_RATIO = 10.0
 LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
+# Distance of a point beside the estimate of a peak, relative to its smaller width at 0.9 of its height, and ratio of both
+# widths above which the wider side is a shoulder
+SIDE_POINT_FRACTION = 0.1
+SHOULDER_RATIO = 2.5
 
 
 class ShootingFinder:
@@ -82,18 +87,45 @@ class ShootingFinder:
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
         laws = [law for law, _ in self.joints.laws]
         have_elements = all(law.law == "masing" for law in laws)
-        self.odd_laws = laws if have_elements and not model.rig.springs.is_nonlinear else ()
+        is_odd = all(
+            law.law in ("masing", "coulomb") and not load.varies for law, load in self.joints.laws
+        )
+        self.odd_laws = laws if is_odd and not model.rig.springs.is_nonlinear else ()
         is_smooth = have_elements and any(masing.has_power_law(law) for law in laws)
         self.follows_curve = self.may_fold or (
             self.draws_curve and is_smooth and self._max_growth_rate < 0
         )
         self.evaluator = LumpedEvaluator(model, self.numerics, patch, self.joints)
+        # Width of the last peak that was estimated [rad/s], in which the curve falls to 0.9 of its height
+        self.estimated_width = np.inf
 
     def make_case(self, drive) -> cases.Case:
         """Return the inputs of the engine for one period from rest under a sine."""
         schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
         rig = self.model.rig
         return cases.make_rig_case(rig, self.joints.laws, schedule, signal=drive, rtol=RTOL)
+
+    def _vary(self, drive: SineDrive, make_drive: Callable[[float], SineDrive]):
+        """Return a function of a parameter that returns the case of its drive, with the arrays of that of another drive.
+
+        Under a load that oscillates each case has arrays of its own, because the longest step depends on both periods.
+        """
+        case = self.make_case(drive)
+        if case.rig.faces[:, Face.SWING].any():
+            return lambda parameter: self.make_case(make_drive(parameter))
+        step_ratio = case.rig.settings[Setting.LONGEST_STEP] / case.rig.settings[Setting.PERIOD]
+
+        def make_case(parameter: float) -> cases.Case:
+            """Return the case of a period under the drive of a parameter."""
+            sine = make_drive(parameter)
+            settings = case.rig.settings.copy()
+            settings[[Setting.OMEGA, Setting.PERIOD]] = sine.omega, sine.period
+            settings[Setting.LONGEST_STEP] = step_ratio * sine.period
+            tones = np.array([[sine.acceleration, sine.omega, 0.0]])
+            rig = case.rig._replace(settings=settings, tones=tones)
+            return replace(case, rig=rig, ends=np.array([sine.period]))
+
+        return make_case
 
     def find_periodic_motion(
         self, drive, guess=None, *, needs_stability: bool = True
@@ -104,8 +136,8 @@ class ShootingFinder:
         ----------
         drive : SineDrive
             Amplitude [m s-2] and angular frequency [rad/s].
-        guess : PeriodicMotion or State, optional
-            Similar motion, or its state.
+        guess : periodic.Start, optional
+            Start of a similar motion.
         needs_stability : bool
             Whether multipliers and errors are needed. Without them a change over a period of MAX_KINKED_CHANGE counts as
             none, and a motion that is found from a guess takes a few periods.
@@ -121,10 +153,11 @@ class ShootingFinder:
         if guess is None or needs_stability or is_undamped:
             motion = periodic.find_periodic_motion(
                 case,
-                start=guess.run.final if isinstance(guess, periodic.PeriodicMotion) else guess,
+                start=None if guess is None else guess.state,
                 n_first=periodic.N_FIRST_CYCLES if guess is None else 1,
                 has_kinks=self.joints.has_kinks,
                 is_undamped=is_undamped,
+                odd_laws=() if guess is None or self.draws_curve else self.odd_laws,
             )
         else:
             motion = periodic.follow_periodic_motion(case, guess, self.odd_laws)
@@ -154,8 +187,8 @@ class ShootingFinder:
         if run is not None:
             solution = self.evaluator.make_solution(run, process_time() - begin, drive)
             errors = {name: RTOL * abs(value) for name, value in solution.values.items()}
-            periodic_data = SteadyData("leaves its grooves", np.zeros(0))
-            return replace(solution, errors=errors, periodic=periodic_data)
+            data = SteadyData("leaves its grooves", np.zeros(0))
+            return replace(solution, steady=SteadyPart(data, errors))
 
         # The periodic motion is run once more from its state, for histories and frames.
         motion, notes = self._find_stable_motion(drive, guess)
@@ -164,50 +197,57 @@ class ShootingFinder:
         run = self.evaluator.resume(drive, cycles, state, self.frames)
         is_stuck = self.evaluator.is_stuck(run)
         solution = self.evaluator.make_solution(run, process_time() - begin, drive)
+        values = dict(solution.values)
+
+        # The errors are those of the steps, which a run with larger ones shows, and of the fixed point.
+        coarse = LumpedEvaluator(
+            self.model, enlarge_hybrid_steps(self.numerics), self.patch, self.joints
+        )
+        coarse_run = coarse.resume(drive, run.cycles_done, state, 0)
+        coarse_values = coarse.evaluate_measures(coarse_run, drive)
+        step_errors = estimate_hybrid_errors(values, coarse_values, RTOL)
+        relative = find_relative_error(motion)
+        errors = {}
+        for name, value in values.items():
+            errors[name] = step_errors.get(name, RTOL * abs(value)) + relative * abs(value)
 
         # A periodic motion does not drift. Friction works what it dissipates, which is nothing where no element slips.
-        values = solution.values
-        errors = self._estimate_errors(values, motion, run, drive, is_stuck=is_stuck)
-        known = {"drift_per_cycle": 0.0}
-        errors["drift_per_cycle"] = 0.0
         dissipated = values.get("energy_dissipated")
+        values["drift_per_cycle"] = errors["drift_per_cycle"] = 0.0
         if is_stuck and dissipated is not None:
-            known |= {"friction_work": dissipated, "loop_area": dissipated / run.cycles_done}
+            values |= {"friction_work": dissipated, "loop_area": dissipated / run.cycles_done}
             if not dissipated:
                 errors |= dict.fromkeys(("friction_work", "energy_dissipated", "loop_area"), 0.0)
 
         # An unstable motion is no result, because a rig would not stay in it.
         regime = self._name_regime(motion, is_stuck=is_stuck)
-        is_stable = is_stuck or motion.grows or motion.is_stable
-        outcome = Outcome.STUCK if is_stuck else solution.outcome or Outcome.STEADY
+        message = run.message
+        outcome = Outcome.STUCK if is_stuck else run.outcome or Outcome.STEADY
         if motion.grows:
             outcome = Outcome.GROWS
         elif float(np.abs(run.extremes).max()) > self.model.rig.springs.travel:
             outcome = Outcome.EXCEEDS_TRAVEL
-        if not is_stable:
+        if not (is_stuck or motion.grows or motion.is_stable):
             outcome = Outcome.NOT_CONVERGED
             regime = f"{regime}, unstable"
-        return replace(
-            solution,
-            values=values | known,
-            outcome=outcome,
-            message=solution.message if is_stable else describe_instability(motion.multipliers),
-            errors=errors,
-            notes=(*solution.notes, *notes),
-            settings=Settings(map="shooting"),
-            periodic=SteadyData(regime, motion.multipliers, motion.change),
-        )
+            message = describe_instability(motion.multipliers)
+        data = SteadyData(regime, motion.multipliers, motion.change)
+        run = replace(run, outcome=outcome, message=message)
+        steady = SteadyPart(data, errors, notes)
+        return replace(solution, values=values, run=run, steady=steady)
 
     def compute_point_values(self, point: CurvePoint) -> Values:
         """Return the measures of the steady motion at a curve point by name; {} if there is none."""
         motion = point.guess.motion if isinstance(point.guess, PathPoint) else point.guess
-        try:
-            if motion is None:
+        if motion is None:
+            try:
                 return self.compute_steady_motion(point.drive).values
-            run = self.evaluator.resume(point.drive, N_CYCLES, motion.run.final, 0)
-        except NotConverged:
-            return {}
-        return self.evaluator.make_solution(run, 0.0, point.drive).values
+            except NotConverged:
+                return {}
+        # Sums over a run grow with its cycles.
+        sums = dict.fromkeys(select_names("run"), N_CYCLES)
+        values = motion.run.values.items()
+        return {name: sums.get(name, 1.0) * value for name, value in values if np.isfinite(value)}
 
     def _find_stable_motion(self, drive, guess) -> tuple[periodic.PeriodicMotion, tuple[str, ...]]:
         """Return a periodic motion, and notes on others under the same drive.
@@ -227,7 +267,7 @@ class ShootingFinder:
             motion = guess.motion
         else:
             try:
-                motion = self.find_periodic_motion(drive, guess)
+                motion = self.find_periodic_motion(drive, guess and guess.start)
             except NotConverged:
                 if not self.may_fold:
                     raise
@@ -277,7 +317,7 @@ class ShootingFinder:
         weak = replace(drive, acceleration=WEAK_DRIVE * level)
         start = self.find_periodic_motion(weak).run.final
         equations = MotionCurve(
-            lambda level: self.make_case(replace(drive, acceleration=level)),
+            self._vary(weak, lambda level: replace(drive, acceleration=level)),
             start,
             weak.acceleration,
             has_kinks=self.joints.has_kinks,
@@ -285,34 +325,6 @@ class ShootingFinder:
         path = equations.follow((0.0, MAX_LEVEL_RATIO * level), LEVEL_PATH)
         motions = [point.motion for point in equations.list_crossings(path, level)]
         return sorted(motions, key=lambda motion: motion.run.values[AMPLITUDE])
-
-    def _estimate_errors(self, values: Values, motion, run, drive, *, is_stuck: bool) -> Values:
-        """Return the errors of the measures of a periodic motion: those of the steps and of the fixed point.
-
-        Parameters
-        ----------
-        values : dict
-            Values of the measures by name.
-        motion
-            Periodic motion that was found, with its fixed point.
-        run : EngineRun
-            Run from which the values follow.
-        drive
-            Drive of the run.
-        is_stuck : bool
-            Whether the interface sticks all the time.
-        """
-        coarse = enlarge_hybrid_steps(self.numerics)
-        other = LumpedEvaluator(self.model, coarse, self.patch, self.joints)
-        start = None if motion.grows else motion.run.final
-        other_run = other.resume(drive, run.cycles_done, start, 0)
-        coarse_values = other.evaluate_measures(other_run, drive, stuck=is_stuck)
-        step_errors = estimate_hybrid_errors(values, coarse_values, RTOL)
-        relative = find_relative_error(motion)
-        errors = {}
-        for name, value in values.items():
-            errors[name] = step_errors.get(name, RTOL * abs(value)) + relative * abs(value)
-        return errors
 
     def _leave_grooves(self, drive):
         """Return the run from rest in which the lifted mass leaves the grooves, or None if it stays in them."""
@@ -351,8 +363,8 @@ class ShootingFinder:
         ----------
         drive : SineDrive
             Drive of the point.
-        guess : PeriodicMotion or State, optional
-            Neighbouring motion, or its state; from rest by default.
+        guess : periodic.Start, optional
+            Start of a neighbouring motion; from rest by default.
         needs_stability : bool
             Whether the multipliers and the errors of the motion are needed.
         """
@@ -397,7 +409,8 @@ class ShootingFinder:
         needs_histories : bool
             Whether the histories of a cycle are needed.
         """
-        point = self.compute_curve_point(drive, guess, needs_stability=False)
+        start = guess and guess.start
+        point = self.compute_curve_point(drive, start, needs_stability=False)
         if not point.values:
             return None
         window = None
@@ -451,7 +464,7 @@ class ShootingFinder:
             return self._follow_curve(drive)
         if not self.draws_curve:
             try:
-                points = self._bracket_peaks(drive)
+                points = self._estimate_peaks(drive)
             except NotConverged:
                 points = []
             if points:
@@ -463,15 +476,16 @@ class ShootingFinder:
             `before` is the pair that this function returned for the frequency before, or None.
             """
             sine = SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving)
-            point = self.compute_curve_point(sine, before and before[1].guess)
+            guess = before and before[1].guess
+            point = self.compute_curve_point(sine, guess and guess.start)
             return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
 
         frequencies = choose_start_frequencies(self.modes, drive)
         samples = sample_adaptively(sample, frequencies)
         return ResponseCurve([point for _, point in samples])
 
-    def _bracket_peaks(self, drive) -> list[CurvePoint]:
-        """Return points around each high maximum of a response curve, in order; [] if the peaks cannot be estimated.
+    def _estimate_peaks(self, drive) -> list[CurvePoint]:
+        """Return a few points near each high maximum of a response curve, in order; [] if the peaks cannot be estimated.
 
         The maxima of the first-harmonic balance are the guesses.
 
@@ -480,20 +494,13 @@ class ShootingFinder:
         drive : SweepDrive
             Its amplitude and its range of frequencies.
         """
-        laws = self.odd_laws
-        if not laws or self._max_growth_rate >= 0:
+        if not self.odd_laws or self._max_growth_rate >= 0:
             return []
         omega = 2 * np.pi * np.sort(choose_start_frequencies(self.modes, drive))
         balanced = harmonic_balance.balance_first_harmonic(
-            self.modes, laws, drive.acceleration, omega
+            self.modes, self.joints.laws, drive.acceleration, omega
         )
         heights = np.abs(balanced.modes @ self.modes.displacement_point)
-
-        def find_point(place) -> CurvePoint:
-            """Return the curve point at a circular frequency [rad/s], from the balance there."""
-            sine = SineDrive(drive.acceleration, float(place), drive.moving)
-            start = balanced.make_start(self.make_case(sine))
-            return self.compute_curve_point(sine, start, needs_stability=False)
 
         # The highest maxima come first, and end where none is high enough beside the motions that were found.
         padded = np.pad(heights, 1)
@@ -503,23 +510,23 @@ class ShootingFinder:
             highest = max((point.values[AMPLITUDE] for point in points), default=0.0)
             if heights[k] < harmonic_balance.MIN_HEIGHT_RATIO * highest:
                 break
-            top = find_point(omega[k])
-            points.append(top)
+            sine = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
+            start = periodic.Start(balanced.make_start(self.make_case(sine)))
+            top = self.compute_curve_point(sine, start, needs_stability=False)
 
-            # Outwards from the estimate, in steps of twice the length, until the amplitude falls on both sides
-            for direction, end in ((-1, omega[0]), (1, omega[-1])):
-                last = top
-                step = direction * measure_peak_width(
-                    heights[k::direction], np.abs(omega[k::direction] - omega[k])
-                )
-                while last.drive.omega != end:
-                    place = np.clip(last.drive.omega + step, omega[0], omega[-1])
-                    point = find_point(place)
-                    points.append(point)
-                    if point.values[AMPLITUDE] < last.values[AMPLITUDE]:
-                        break
-                    last = point
-                    step *= 2
+            # A point beside it in the range, and one at the end of a shoulder, where another peak may be higher
+            points.append(top)
+            sides = (slice(k, None), slice(k, None, -1))
+            spans = [np.abs(omega[side] - omega[k]) for side in sides]
+            widths = [measure_peak_width(heights[side], span) for side, span in zip(sides, spans)]
+            self.estimated_width = min(filter(None, widths))
+            wide = max(widths)
+            steps = [SIDE_POINT_FRACTION * self.estimated_width]
+            steps += [wide] * (wide > SHOULDER_RATIO * self.estimated_width)
+            for step in steps if widths[0] == wide else [-step for step in steps]:
+                beside = replace(sine, omega=float(omega[k] + step))
+                start = top.guess.start
+                points.append(self.compute_curve_point(beside, start, needs_stability=False))
         return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
 
     def _follow_curve(self, drive) -> ResponseCurve:
@@ -531,7 +538,7 @@ class ShootingFinder:
                 "accuracy.method: the motion at the first frequency of the sweep grows for ever; change drive.from"
             )
         self._equations = MotionCurve(
-            lambda omega: self.make_case(replace(first, omega=omega)),
+            self._vary(first, lambda omega: replace(first, omega=omega)),
             motion.run.final,
             first.omega,
             has_kinks=self.joints.has_kinks,
@@ -540,7 +547,7 @@ class ShootingFinder:
         bounds = (float(ends.min()), float(ends.max()))
         path = self._equations.follow(bounds, FREQUENCY_PATH, forward=drive.high > drive.low)
         points = [self._describe_path_point(point) for point in path.points]
-        folds = tuple(fold / (2 * np.pi) for fold in path.folds)
+        folds = np.array([path.folds, path.fold_errors]) / (2 * np.pi)
         return ResponseCurve(
             points, folds, tuple(note_end_of_curve(points, path.ended, drive.high))
         )
@@ -567,6 +574,15 @@ class ShootingFinder:
             return measure_distance(first.guess, second.guess, self._sweep_width())
         return abs(second.drive.omega - first.drive.omega)
 
+    def measure_missing_ends(self, points: list[CurvePoint]) -> tuple[float, float]:
+        """Return the distances [rad/s] of the first and the last point of a curve from the ends of the sweep."""
+        if self.follows_curve:
+            return 0.0, 0.0
+        drive = self.model.rig.drive.signal
+        ends = 2 * np.pi * np.array([drive.low, drive.high])
+        first, last = np.abs(ends - [points[k].drive.omega for k in (0, -1)])
+        return float(first), float(last)
+
     def compute_point_between(
         self, first: CurvePoint, second: CurvePoint, fraction: float
     ) -> CurvePoint:
@@ -590,7 +606,8 @@ class ShootingFinder:
             return self._describe_path_point(point)
         omega = first.drive.omega + fraction * (second.drive.omega - first.drive.omega)
         sine = replace(first.drive, omega=omega)
-        guess = first.guess if fraction < 0.5 else second.guess
+        guesses = [point.guess.start for point in (first, second) if point.guess is not None]
+        guess = guesses[0].interpolate(guesses[-1], fraction) if guesses else None
         return self.compute_curve_point(sine, guess, needs_stability=self.draws_curve)
 
 
@@ -647,9 +664,7 @@ def find_relative_error(motion: periodic.PeriodicMotion) -> float:
     return motion.error + STEPS_ERROR * RTOL
 
 
-def solve_steady_motion(
-    model, numerics, patch, frames: int = 0, say=None, progress=None
-) -> Solution:
+def solve_steady_motion(model, numerics, patch, frames: int = 0, say=None) -> Solution:
     """Compute the steady motion under a sine, or the largest one over a sweep.
 
     The drive of the largest motion is `Solution.drive`.
@@ -664,8 +679,8 @@ def solve_steady_motion(
         None under [normal] and between masses.
     frames : int
         Number of snapshots of the interface in a cycle.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction; progress is not used.
+    say : callable, optional
+        Callback for a line of text.
 
     Returns
     -------

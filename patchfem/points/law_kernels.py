@@ -3,7 +3,7 @@
 `find_force` follows the law of a point along the path of a step, exactly for laws of the path. The memory goes on to the end
 of the step if the step is accepted. The other functions tell where a step ends and which part of it is slip. The memory of
 each law begins with `Memory`; that of parallel sliders goes on with `Masing`. A law is a number in `Law` with a branch in
-these functions, and its numbers are those of `LawNumber`. COULOMB and JENKINS belong to `linear_cases_kernels`.
+these functions, and its numbers are those of `LawNumber`. The force of COULOMB and JENKINS belongs to `motion_kernels`.
 """
 
 from math import exp, inf, sqrt
@@ -17,17 +17,10 @@ from ..friction.bonds.point_kernels import shape_functions
 from ..friction.laws.bouc_wen_kernels import FINE_PIECES, follow_path
 from ..friction.laws.lugre_kernels import LuGreNumber, relaxation_length
 from ..friction.laws.lugre_kernels import find_force as find_bristle_force
-from .law_rows import Law, LawNumber, Masing, Memory
+from .rows import Law, LawNumber, Masing, Memory
 
 CORNER_TOLERANCE = 1e-5  # smallest path to a corner relative to that of its branch
 MIN_HALF_PATH = 0.1  # shortest path of the bristles in half of a step, or in the other, relative to that of the step
-
-
-class PointLaw(NamedTuple):
-    """Law of a point: its numbers (k,) and its memory (l,)."""
-
-    numbers: np.ndarray
-    memory: np.ndarray
 
 
 class Step(NamedTuple):
@@ -55,13 +48,15 @@ class Branch(NamedTuple):
     """Curve of the force between two turns.
 
     - start: slide at the start of the step [m]
-    - direction: of the motion, 1 or -1, or 0 during stick of a law that is linear between events
+    - direction: of slip, 1 or -1, or 0 during stick of a law that is linear between events
+    - sign: of the motion, 1 or -1
     - length, path: slide from the start of the branch, and from that of the step, to the corner of the curve, at which all
       sliders slip or the force of BOUC_WEN is 0 [m]; the path is inf without such a corner
     """
 
     start: float
     direction: float
+    sign: float
     length: float
     path: float
 
@@ -307,22 +302,39 @@ def find_path_to_rest(stretch, numbers):
 
 
 @njit(**NJIT_KERNEL)
-def find_branch(first, law):
-    """Return the `Branch` of a law on which the motion goes on from an `Instant`."""
+def find_branch(first, last, law, direction):
+    """Return the `Branch` of a law on which the motion goes on.
+
+    Parameters
+    ----------
+    first, last : Instant
+        Start of the step, and its end without an event.
+    law : PointLaw
+    direction : float
+        Direction of slip of a law that is linear between events, 0 during stick.
+    """
     numbers = law.numbers
     memory = law.memory
-    rate = first.velocity if first.velocity != 0 else first.acceleration
-    direction = 1.0 if rate > 0 else -1.0
+    kind = numbers[LawNumber.LAW]
     length = numbers[LawNumber.LENGTH]
-    if numbers[LawNumber.LAW] == Law.BOUC_WEN:
-        path = length * find_path_to_rest(direction * memory[Memory.STRETCH] / length, numbers)
-        return Branch(first.slide, direction, length, path)
-    if numbers[LawNumber.LAW] != Law.MASING:
-        return Branch(first.slide, direction, 1.0, inf)
-    n = int(memory[Masing.COUNT])
-    turns = direction * memory[Masing.DIRECTION] < 0
-    if n == 0 and memory[Masing.VIRGIN] < 0 and not turns:
-        return Branch(first.slide, direction, 1.0, inf)
+    q = first.slide
+    rate = first.velocity if first.velocity != 0 else first.acceleration
+    if rate == 0:
+        rate = last.velocity
+    sign = 1.0 if rate > 0 else -1.0
+    if kind <= Law.JENKINS:
+        if direction != 0:
+            return Branch(q, direction, direction, 1.0, inf)
+        return Branch(
+            q, 0.0, sign, 1.0, length * (1 - sign * first.force / numbers[LawNumber.LIMIT])
+        )
+    if kind == Law.BOUC_WEN:
+        path = length * find_path_to_rest(sign * memory[Memory.STRETCH] / length, numbers)
+        return Branch(q, sign, sign, length, path)
+    n = int(memory[Masing.COUNT]) if kind == Law.MASING else 0
+    turns = kind == Law.MASING and sign * memory[Masing.DIRECTION] < 0
+    if kind != Law.MASING or (n == 0 and memory[Masing.VIRGIN] < 0 and not turns):
+        return Branch(q, sign, sign, 1.0, inf)
 
     # A branch after a turn is twice as long as the first loading.
     if n > 0 or turns:
@@ -330,8 +342,8 @@ def find_branch(first, law):
     start = memory[Masing.STACK + 2 * n - 2] if n > 0 else 0.0
     if turns:
         start = memory[Masing.SLIDE]
-    path = length - direction * (memory[Masing.SLIDE] - start)
-    return Branch(first.slide, direction, length, path if path > CORNER_TOLERANCE * length else inf)
+    path = length - sign * (memory[Masing.SLIDE] - start)
+    return Branch(q, sign, sign, length, path if path > CORNER_TOLERANCE * length else inf)
 
 
 @njit(**NJIT_KERNEL)

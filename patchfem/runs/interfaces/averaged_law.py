@@ -82,37 +82,40 @@ def make_averages(keys, patch) -> np.ndarray | None:
     return weights * area[:, None, None] / np.stack([area[:-1], area[1:]], axis=1)
 
 
-def slip_force_ratio(keys, patch) -> float:
-    """Return the ratio of the force at which a rigid block slips to static coefficient times load.
+def replace_law(keys, patch):
+    """Return Coulomb's law in place of a law that averages the pressure; other laws are unchanged.
 
-    It is 1 unless the law averages the pressure along the slide, as the law 'convolution' does.
+    On a rigid block the sum of the friction limits of all nodes is a constant fraction of the load, which replaces the
+    coefficient of friction.
 
     Parameters
     ----------
     keys : Friction
-        Effective keys of the law.
+        Effective keys of the friction law.
     patch : Patch or None
-        Solved patch.
+        Solved patch with the pressure; None for a single point.
 
     Raises
     ------
     PatchfemError
         If the slip force differs between the two directions of sliding.
     """
-    loads = find_loads(keys, patch)
-    if loads is None:
-        return 1.0
-    forward, back = loads.sum(axis=1)
-    if abs(forward - back) > EQUAL_FRICTION_LIMITS_TOL * max(forward, back):
-        raise PatchfemError(
-            describe_unsupported(
-                f"law '{keys.law}' with a pressure that is not symmetric (slip force {forward * keys.static:.6g} N "
-                f"forward, {back * keys.static:.6g} N back)",
-                "use 'march'",
-            ),
-            "accuracy.method",
-        )
-    return (forward + back) / 2 / patch.pressure.load
+    if not law_has_trait(keys.law, "averaged"):
+        return keys
+    static = keys.static
+    if patch is not None:
+        forward, back = find_loads(keys, patch).sum(axis=1)
+        if abs(forward - back) > EQUAL_FRICTION_LIMITS_TOL * max(forward, back):
+            raise PatchfemError(
+                describe_unsupported(
+                    f"law '{keys.law}' with a pressure that is not symmetric (slip force {forward * static:.6g} N "
+                    f"forward, {back * static:.6g} N back)",
+                    "use 'march'",
+                ),
+                "accuracy.method",
+            )
+        static *= (forward + back) / 2 / patch.pressure.load
+    return keys.model_copy(update={"law": "coulomb", "static": static, "kinetic": static})
 
 
 def distribute_slip_force(keys, patch, forces, offsets) -> np.ndarray:
