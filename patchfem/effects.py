@@ -4,9 +4,9 @@ An effect is a table of a scene, such as `contact.crown`, or the value of a key,
 has a row with the module and the equation of each effect. Only the modules of the effects in a scene are imported.
 
 Friction laws, gap shapes and waveforms have further columns. Those of a law are its keys in addition to `static`, its
-supported features and its traits, as words separated by blanks. A waveform accepts `cycles` and `duration`, too, and
-requires one of them if it is endless. Every law can be used in a bench, and in a rig with one
-interface under a constant load. Optional features are:
+supported features and its traits, as words separated by blanks. Those of a waveform are all its keys, and its traits,
+which are fields of the class `Waveform`. Every law can be used in a bench, and in a rig with one interface under a constant
+load. Optional features are:
 
 - `shear`: elastic pieces ([contact.shear]);
 - `exact`: steady motions of the whole interface as one rigid element;
@@ -27,7 +27,7 @@ Traits of laws:
 `hybrid.laws` and `time_steps.laws` have their own lists of supported laws.
 
 A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
-`DRIVE_BUILDERS` of its module; the class `Waveform` describes its traits.
+`DRIVE_BUILDERS` of its module.
 """
 
 import re
@@ -143,22 +143,26 @@ def list_displayed_absent_effects(names, engine: str | None) -> list[str]:
     return [name for name in names if name != f"accuracy.method={engine}"]
 
 
-LAWS = {
-    name.removeprefix("friction.law="): effect
-    for name, effect in EFFECTS.items()
-    if name.startswith("friction.law=")
-}
+def _select_values(key: str) -> dict[str, Effect]:
+    """Return the effects that are the values of a key, such as "friction.law", by value."""
+    prefix = f"{key}="
+    return {
+        name.removeprefix(prefix): effect
+        for name, effect in EFFECTS.items()
+        if name.startswith(prefix)
+    }
+
+
+LAWS = _select_values("friction.law")
 GAP_SHAPES = {
     name.removeprefix("contact."): effect
     for name, effect in EFFECTS.items()
     if effect.module == "patchfem.contact.gaps"
 }
-WAVEFORMS = {}
-for _effect_name, _effect in EFFECTS.items():
-    if _effect_name.startswith("drive.waveform="):
-        _name = _effect_name.removeprefix("drive.waveform=")
-        _traits = dict.fromkeys(_effect.traits.split(), True)
-        WAVEFORMS[_name] = Waveform(_name, _effect.keys, **_traits)
+WAVEFORMS = {
+    name: Waveform(name, effect.keys, **dict.fromkeys(effect.traits.split(), True))
+    for name, effect in _select_values("drive.waveform").items()
+}
 NO_WAVEFORM = Waveform()  # waveform of a release and of an unknown name
 
 

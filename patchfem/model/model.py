@@ -194,8 +194,12 @@ class Model:
     @property
     def bonds(self) -> Bonds:
         """Bond parameters of the law 'nonlocal' (report, equations 2.10-2.17)."""
+        return self.make_bonds(self.friction)
+
+    def make_bonds(self, law: Friction) -> Bonds:
+        """Return the bond parameters of a law 'nonlocal' at the sliding speed of the model, from its effective keys."""
         min_rest_speed = 0.0 if self.rig is None else MIN_RIG_REST_SPEED
-        return make_bond_parameters(self.friction, self.speed_scale, min_rest_speed)
+        return make_bond_parameters(law, self.speed_scale, min_rest_speed)
 
 
 def build_without_sweep(scene: Scene) -> Model:

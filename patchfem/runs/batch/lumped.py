@@ -61,8 +61,9 @@ BATCH_STEPS_PER_CYCLE = (20, 40, 80, 160, 320, 640)
 BATCH_ORDER = 4.0  # order of convergence of these marches
 # Part of the mean square of the relative errors of a case that is added to the error of each of its measures
 POOLED_ERROR = 0.5
+DRIFT = "drift_per_cycle"  # name of the measure, which is the difference of two cycles
 # Measures whose error is not relative to their value
-UNPOOLED_MEASURES = {"drift_per_cycle", *ERROR_MEASURES}
+UNPOOLED_MEASURES = {DRIFT, *ERROR_MEASURES}
 EXACT_STEPS_PER_CYCLE = 16  # steps of laws that are linear between events, which are exact
 EXACT_ROUND_OFF = 1e-12  # round-off of their measures, relative to the value
 # Smallest distance of the drive from the frequencies of an undamped mode, relative to the squared frequency of the drive,
@@ -79,7 +80,6 @@ MAX_STICKING_SLIP_RATIO = 1e-3
 MAX_MICRO_DAMPING_RATIO = 4.0
 # Error of a measure that two marches have alike but for round-off, such as a friction limit, relative to its value
 MEASURE_CHANGE_ROUND_OFF = 1e-12
-DRIFT = "drift_per_cycle"  # name of the measure, which is the difference of two cycles
 SECANT_STIFFNESS = "secant_stiffness"  # name of the measure
 CREEP_KEY = "friction.reference_speed"  # key on which the note on creep depends
 
@@ -338,6 +338,8 @@ def estimate_errors(
         errors = estimate_convergence_errors(
             fine, *coarser, order=BATCH_ORDER, max_order=BATCH_ORDER
         )
+        # Two cycles differ by less than the errors of their events, so that a drift has no order of its own.
+        errors |= estimate_convergence_errors(*({DRIFT: run[DRIFT]} for run in (fine, *coarser)))
 
         # A change that is small by accident does not give an error far below those of the other measures, relative to
         # the value of a measure or to the terms of a difference.
@@ -569,11 +571,11 @@ def _judge_motions(group: Group, refined: Refined) -> MotionEnds:
 
     # A periodic motion about a moving mean is transient.
     drifts = is_drifting(
-        values["drift_per_cycle"],
-        refined.errors["drift_per_cycle"],
+        values[DRIFT],
+        refined.errors[DRIFT],
         values[AMPLITUDE],
         group.tolerance,
-        find_error_floor("drift_per_cycle", values, group.displacement),
+        find_error_floor(DRIFT, values, group.displacement),
     )
     is_steady = classes == MOTION_CLASSES.index(Outcome.STEADY)
     return MotionEnds(

@@ -13,8 +13,7 @@ import numpy as np
 from ... import friction, structure
 from ...core import Missing
 from ...effects import law_has_trait, needs_bond_list
-from ...model.law import make_bond_parameters
-from ...model.model import MIN_RIG_REST_SPEED, Model
+from ...model.model import Model
 
 # Ratio of the stroke that bond summation has to resolve to the first stroke of a released motion.
 DECAYED_STROKE_RATIO = 1e-2
@@ -49,12 +48,6 @@ def has_bond_list(model: Model) -> bool:
     return any(sums_over_lists(model, law.numbers) for law in model.rig.friction.interfaces)
 
 
-def make_bonds(model: Model, keys):
-    """Return the parameters of the bonds of a law, whose effective keys are given, at the speed of a model."""
-    min_rest_speed = 0.0 if model.rig is None else MIN_RIG_REST_SPEED
-    return make_bond_parameters(keys, model.speed_scale, min_rest_speed)
-
-
 def _choose_sum(model: Model, keys, tolerance: float, stroke: float, steps: float):
     """Return how the bonds of a law are summed, as a `friction.bonds.engines.EngineChoice`.
 
@@ -82,7 +75,7 @@ def _choose_sum(model: Model, keys, tolerance: float, stroke: float, steps: floa
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     engines = friction.bonds.engines
     requested = engines.RequestedEngine(name, tail, accuracy.merge)
-    return engines.choose_engine(make_bonds(model, keys), tolerance, stroke, steps, requested)
+    return engines.choose_engine(model.make_bonds(keys), tolerance, stroke, steps, requested)
 
 
 @lru_cache(maxsize=8)

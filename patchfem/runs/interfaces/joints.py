@@ -16,7 +16,7 @@ from ...effects import law_has_trait, law_supports
 from ...model.model import Model
 from ..patch import faces, jenkins_elements
 from ..results.interfaces import depends_on_pressure
-from . import bands, bond_lists
+from . import bands
 
 
 class Joint(NamedTuple):
@@ -64,7 +64,7 @@ class Joint(NamedTuple):
         """
         keys = keys or self.keys
         if law_has_trait(keys.law, "bonds"):
-            return bond_lists.make_bonds(self.model, keys)
+            return self.model.make_bonds(keys)
         return friction.record.make_law(keys, self.total)
 
     def list_elements(self) -> tuple[np.ndarray, np.ndarray]:

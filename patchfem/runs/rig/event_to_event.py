@@ -53,9 +53,8 @@ N_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40  # largest number of these in a cycle by default
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 SAME_SAMPLE_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
-SAME_PLACE_TOL = (
-    1e-6  # distance from a place of a grid of equal distances that is round-off, in distances
-)
+# Distance from a place of a grid of equal distances that is round-off, in distances
+SAME_PLACE_TOL = 1e-6
 # Groups of measures that are computed in the same way where bands of a face slide apart: those of the motion, of the whole
 # run and of the errors of the solution. The others follow from the averages over the bands.
 BAND_MEASURE_GROUPS = ("curve", "run", "error")

@@ -25,9 +25,8 @@ from ...response.events import (
 )
 from ...response.rows import MOTION_TABLE
 
-EXACT_RELATIVE_ERROR = (
-    1e-9  # relative error of the measures of an event-driven run, which has round-off only
-)
+# Relative error of the measures of an event-driven run, which has round-off only
+EXACT_RELATIVE_ERROR = 1e-9
 # Largest number of bisections of an onset; 40 of them reduce the bracket to 1e-12.
 MAX_ONSET_BISECTIONS = 40
 
@@ -229,11 +228,12 @@ def measure_onset_level(rig, found: LevelRuns, coarser, tolerance: float) -> Mea
         Largest width of the bracket relative to the level.
     """
     unit, factor = _find_level_unit(rig)
+    floor = MOTION_TABLE["onset_level"].floor
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
     onset = find_onset(found, tolerance, is_past_onset)
     if onset is None:
         reason = make_no_onset_reason(*rig.drive.levels.onset)
-        return Measure(None, unit, None, MOTION_TABLE["onset_level"].floor, reason=reason)
+        return Measure(None, unit, None, floor, reason=reason)
     level, error = onset
     for run, beside in coarser:
         coarse = find_onset(run.levels, tolerance, is_past_onset)
@@ -244,7 +244,7 @@ def measure_onset_level(rig, found: LevelRuns, coarser, tolerance: float) -> Mea
         if coarse is not None and reference is not None:
             change = coarse[0] - reference[0]
         error += convergence_error(change, order=MAX_CONVERGENCE_ORDER)
-    return Measure(factor * level, unit, factor * error, 1e-9)
+    return Measure(factor * level, unit, factor * error, floor)
 
 
 def convert_to_scene_units(rig, levels) -> tuple[Level, ...]:

@@ -41,11 +41,10 @@ from .curves import (
     ResponseCurve,
     describe_instability,
     estimate_point_errors,
-    measure_peak_width,
     note_end_of_curve,
     sample_adaptively,
-    solve_peak,
 )
+from .peaks import measure_peak_width, solve_peak
 
 N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
 
