@@ -139,10 +139,10 @@ def _describe_peak(result: Result, measures: Quantities) -> str:
     place = _format_measure("peak_frequency", measures)
     width = measures.get("peak_width")
     if width is not None and width.value is not None:
-        place += f" with a half-power width of {_format_measure('peak_width', measures)}"
+        place += f", width {_format_measure('peak_width', measures)}"
     if folds:
         return f"at the peak, {place}, of a curve with folds at {' and '.join(folds)}"
-    return f"at the peak of the response curve, {place}"
+    return f"at the peak, {place}"
 
 
 def _choose_headline(result: Result, measures: Quantities) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from ..friction.bonds.point_kernels import shape_functions
-from ..friction.laws.bouc_wen_kernels import FINE_PIECES, follow_path
+from ..friction.laws.bouc_wen_kernels import follow_path
 from ..friction.laws.lugre_kernels import LuGreNumber, relaxation_length
 from ..friction.laws.lugre_kernels import find_force as find_bristle_force
 from .rows import Law, LawNumber, Masing, Memory
@@ -97,8 +97,7 @@ def find_force(law, step, commits):
         end = 1 - (1 - z) * decay
         square = 2 + (memory[Memory.SQUARE] - 2 - 2 * (1 - z) * path) * decay
     else:
-        shape = numbers[LawNumber.SHAPE]
-        end = follow_path(z, path, numbers[LawNumber.EXPONENT], shape, FINE_PIECES).end
+        end = follow_path(z, path, numbers[LawNumber.EXPONENT], numbers[LawNumber.SHAPE]).end
         square = end * end
     if commits:
         memory[Memory.STRETCH] = direction * length * end

@@ -9,7 +9,7 @@ from math import exp, sqrt
 
 from ..compiled.flags_kernels import NJIT_CALL
 from ..compiled.jit import njit
-from ..friction.laws.bouc_wen_kernels import COARSE_PIECES, FollowedPath, follow_path
+from ..friction.laws.bouc_wen_kernels import FollowedPath, follow_path
 from .step_rows_kernels import WIDTH, Value
 
 # Relaxation over a step below which the first term of a series is exact to 1e-6
@@ -102,7 +102,7 @@ def slide_bouc_wen(numbers, memory, trial, values, count, step):
         y = max(start / middle, -1.0)
         beyond = (start / middle - y) * exp(-path)
         energy = 0.5 * length * start * start / first_springs
-        moved = follow_path(y, path, exponent, numbers[3 * WIDTH + j], COARSE_PIECES)
+        moved = follow_path(y, path, exponent, numbers[3 * WIDTH + j])
         slipped = max(path - (moved.end - y), 0.0) * middle / springs
         moved = FollowedPath(moved.end + beyond, moved.mean + beyond)
         mean = moved.mean if path > 0 else start / middle

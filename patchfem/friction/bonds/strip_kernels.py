@@ -100,7 +100,7 @@ def make_increment(state, growth, slide, v_0, v_1, dt):
 def move(increment, fraction):
     """Return how bonds have `Moved` after a fraction of an increment."""
     path = fraction * abs(increment.slide)
-    decay = exp(-fraction * increment.growth)
+    decay = exp(-fraction * increment.growth) if increment.growth > 0 else 1.0
     length = increment.target + (increment.before - increment.target) * decay
     return Moved(path, path / increment.middle, decay, length)
 
@@ -244,7 +244,7 @@ def pull_new_strips(state, law, increment):
 
 
 @njit(**NJIT_KERNEL)
-def slide_strip(strip, law, increment):
+def slide_strip(strip, law, increment, ends):
     """Return the mean force [N] over mu_s of a `Strip` over an increment.
 
     Parameters
@@ -255,6 +255,8 @@ def slide_strip(strip, law, increment):
         Entries of `ListLaw`.
     increment : Increment
         Increment of the list.
+    ends : Ends
+        Ends of the strip after the increment; not used if its bonds act with powers of their stretches.
     """
     # The force is smooth between the instants at which the stretches of the ends vanish. The ages of mature bonds are
     # linear, so that their mean is exact.
@@ -269,7 +271,7 @@ def slide_strip(strip, law, increment):
             mean += (middle - low) * average_pull(strip, law, increment, low, middle)
         if high > middle:
             before = find_ends(strip, law, move(increment, middle))
-            after = find_ends(strip, law, move(increment, high))
+            after = ends if high == 1.0 else find_ends(strip, law, move(increment, high))
             start = find_stretches(strip, middle * increment.slide)
             stop = find_stretches(strip, high * increment.slide)
             force = slide_signs(before, after, strip.weight, start, stop, law)
@@ -398,10 +400,17 @@ def slide_list(bonds, slide, velocity, dt):
     new = pull_new_strips(state, law, increment)
     mean = new.mean
     end = new.end
+    has_powers = law[ListLaw.IS_STRETCH] * law[ListLaw.ORDER] != 0.0
+    ends = find_ends(read_strip(strips, 0), law, last)
     for k in range(int(state[ListState.COUNT])):
         strip = read_strip(strips, k)
-        end += pull_strip(strip, law, last, probe).force
-        mean += slide_strip(strip, law, increment)
+        if has_powers:
+            end += pull_strip(strip, law, last, probe).force
+        else:
+            ends = find_ends(strip, law, last)
+            stretches = find_stretches(strip, probe)
+            end += pull_signs(ends, strip.weight, stretches, law).force
+        mean += slide_strip(strip, law, increment, ends)
     slope = (end - mean) / probe
     change = slide - probe
     return ListForce(mean + change * slope, end + 2 * change * slope, slope)

@@ -10,29 +10,13 @@ from typing import NamedTuple
 from ...compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ...compiled.jit import njit
 
+PIECE = 0.03125  # longest path in lengths that a Runge-Kutta step integrates
 NEARLY_SATURATED = 1e-3  # distance of y from 1 below which any exponent has a closed form
 LAST_PIECE = 1e-12  # shortest path before y = 0 in lengths
+FIRST_PIECE = 1e-8  # shortest path in lengths beside y = 0, where a fractional power is not smooth
+GRADING = 0.25  # longest path beside y = 0 relative to y, for such a power
 SATURATED = 1e-14  # distance of |y| from 1 that is round-off
 SMALL_RATIO = 1e-4  # x below which a series replaces ln(1 + x)/x
-
-
-class Pieces(NamedTuple):
-    """Paths in lengths that a Runge-Kutta step integrates.
-
-    - longest: longest path, for an exponent up to 2
-    - first: shortest path beside y = 0, where a fractional power is not smooth
-    - grading: longest path beside y = 0 relative to y, for such a power
-    """
-
-    longest: float
-    first: float
-    grading: float
-
-
-FINE_PIECES = Pieces(0.03125, 1e-8, 0.25)  # error 4e-9 of the limit over a half cycle
-COARSE_PIECES = Pieces(
-    0.125, 1e-4, 0.5
-)  # error 4e-7, below that of time steps; a fourth of the time
 
 
 class FollowedPath(NamedTuple):
@@ -96,7 +80,7 @@ def _unload_linearly(y, unloading, path):
 
 
 @njit(**NJIT_CALL)
-def follow_path(y, path, power, shape, pieces):
+def follow_path(y, path, power, shape):
     """Return y after a path, by Runge-Kutta steps where the solution is not known.
 
     Parameters
@@ -107,15 +91,13 @@ def follow_path(y, path, power, shape, pieces):
         Path >= 0 in lengths [1].
     power, shape : float
         Exponent n and shape s of the law.
-    pieces : Pieces
-        Paths of the Runge-Kutta steps.
 
     Returns
     -------
     FollowedPath
     """
     unloading = 1 - 2 * shape
-    longest = pieces.longest / max(2.0, power)
+    longest = PIECE / max(2.0, power)
     nearly = 1.0 if power == 1.0 or power == 2.0 else NEARLY_SATURATED
     left = path
     area = 0.0
@@ -143,7 +125,7 @@ def follow_path(y, path, power, shape, pieces):
         if y < 0:
             piece = min(piece, max(-y / max(first, 1.0), LAST_PIECE))
         if power % 1 != 0:
-            piece = min(piece, max(pieces.grading * abs(y), pieces.first))
+            piece = min(piece, max(GRADING * abs(y), FIRST_PIECE))
 
         # Runge-Kutta step of order 4 for y and its integral over the path.
         second = _find_rate(y + 0.5 * piece * first, power, unloading)
