@@ -145,12 +145,12 @@ def list_displayed_absent_effects(names, engine: str | None) -> list[str]:
 
 def _select_values(key: str) -> dict[str, Effect]:
     """Return the effects that are the values of a key, such as "friction.law", by value."""
-    prefix = f"{key}="
-    return {
-        name.removeprefix(prefix): effect
-        for name, effect in EFFECTS.items()
-        if name.startswith(prefix)
-    }
+    values = {}
+    for name, effect in EFFECTS.items():
+        effect_key, _, value = name.partition("=")
+        if effect_key == key:
+            values[value] = effect
+    return values
 
 
 LAWS = _select_values("friction.law")

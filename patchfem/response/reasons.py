@@ -49,7 +49,7 @@ OPEN_LOOP_REASON = (
 
 
 def find_missing(
-    values, window, drive, has_loaded_interface: bool, other_modes_fraction: float = 0.0
+    values, span: float, drive, has_loaded_interface: bool, other_modes_fraction: float = 0.0
 ) -> Measures:
     """Return the measures for which a run has no value, each with the reason, by name.
 
@@ -57,8 +57,8 @@ def find_missing(
     ----------
     values : dict
         Values or Measures of the run by name.
-    window : Response
-        Last cycles.
+    span : float
+        Duration of the last cycles [s].
     drive
         Drive of the last cycles.
     has_loaded_interface : bool
@@ -69,7 +69,7 @@ def find_missing(
     reasons = {}
     for name in CYCLE_MEASURES if has_loaded_interface else ACCELERATION_MEASURES:
         reasons[name] = _explain_missing_cycle_value(
-            name, values, window, drive, other_modes_fraction
+            name, values, span, drive, other_modes_fraction
         )
     if hasattr(drive, "band"):
         reasons |= dict.fromkeys(
@@ -185,7 +185,7 @@ def _explain_missing_phase(values, drive) -> str:
 
 
 def _explain_missing_cycle_value(
-    name: str, values, window, drive, other_modes_fraction: float
+    name: str, values, span: float, drive, other_modes_fraction: float
 ) -> str:
     """Return the reason why a measure of the last cycles has no value.
 
@@ -195,8 +195,8 @@ def _explain_missing_cycle_value(
         Name of the measure.
     values : dict
         Values of the measures that have one, by name.
-    window : Response
-        Samples of the last cycles.
+    span : float
+        Duration of the last cycles [s].
     drive
         Drive of the run.
     other_modes_fraction : float
@@ -204,7 +204,7 @@ def _explain_missing_cycle_value(
     """
     if not structure.drive_sizes.is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
-    if not structure.drive_sizes.has_full_cycle(window.time[-1] - window.time[0], drive):
+    if not structure.drive_sizes.has_full_cycle(span, drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATION_MEASURES and ACCELERATION_MEASURES[0] in values:
         return OUTPUT_AT_REST_REASON

@@ -210,7 +210,8 @@ FUNCTIONS = {
     "normal_load_peak": lambda s: s.evaluate_load(np.max),
     "open_fraction": lambda s: s.evaluate_load(lambda load: np.mean(load <= 0)),
 }
-# Sizes of the larger terms by their names in measures.toml, or functions of the measures of an interface that return them
+# Sizes of the larger terms by their names in measures.toml, and functions of the measures of an interface that return the
+# others, by measure
 LARGER_TERMS = {"1": 1.0, "pi": np.pi}
 LARGER_TERM_FUNCTIONS = {
     "drift_per_cycle": _find_drift_scale,

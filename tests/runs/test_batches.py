@@ -10,6 +10,7 @@ from scene_texts import (
     COULOMB,
     CROWNED_JOINT,
     MODE,
+    NONLOCAL,
     PLASTIC,
     POINT,
     SHEAR,
@@ -19,6 +20,7 @@ from scene_texts import (
 
 import patchfem as pf
 from patchfem.core import PatchfemError
+from patchfem.points.cases import march_cases
 from patchfem.runs import FAILED_OUTCOME, solve_with_coarser
 from patchfem.runs.batch import batches, lumped, one_by_one
 from patchfem.runs.patch import store
@@ -43,6 +45,7 @@ TEXTS = {
 # Relative tolerance of measures of the pressure at an end of uncoated pieces, a mean over one cell.
 END_TOLERANCES = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
 RIG = POINT + COULOMB + SHORT
+BONDS = POINT + NONLOCAL + SHORT
 STEADY = "relative_displacement_amplitude_steady"
 CLOSE_MEASURES = {
     "relative_displacement_amplitude",
@@ -119,6 +122,25 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
         assert (difference <= allowed)[is_known].all(), name
         n_compared += is_known.any()
     assert n_compared >= 4
+
+
+def test_always_error_of_drift_holds_where_it_changes_little_by_accident():
+    """The errors of the drift contain that of a march with far more steps in at least 95 % of cases at resonance."""
+    rng = np.random.default_rng(5)
+    keys = {
+        "friction.static": rng.uniform(0.1, 0.5, 100),
+        "drive.acceleration": rng.uniform(10, 60, 100),
+    }
+    models = [pf.build(BONDS, **dict(zip(keys, map(float, row)))) for row in zip(*keys.values())]
+    group = lumped.collect_cases(models)
+    exact = march_cases(group.cases, 4 * lumped.BATCH_STEPS_PER_CYCLE[-1]).values["drift_per_cycle"]
+    holds = []
+    for cases, refined in lumped.refine(group):
+        difference = refined.march.values["drift_per_cycle"] - exact[cases]
+        holds += (np.abs(difference) <= refined.errors["drift_per_cycle"])[
+            np.isfinite(difference)
+        ].tolist()
+    assert len(holds) == 100 and np.mean(holds) >= 0.95
 
 
 def test_always_sticking_points_are_computed_together():

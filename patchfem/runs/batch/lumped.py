@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from time import process_time
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -506,7 +505,6 @@ def make_results(models: Sequence[Model], group: Group, refined: Refined) -> Cas
     # Measures that a case lacks get the reasons that a single run states. They are the same for cases that lack the same
     # measures and stick alike.
     drive = first.rig.drive.signal
-    last_cycles = SimpleNamespace(time=np.array([0.0, group.window * drive.period]), extra={})
     sticking = values["stick_fraction"]
     patterns = np.vstack([results.find_known(), sticking == 1, sticking > 0])
     _, firsts, places = np.unique(patterns, axis=1, return_index=True, return_inverse=True)
@@ -514,7 +512,7 @@ def make_results(models: Sequence[Model], group: Group, refined: Refined) -> Cas
         names = [name for name in results.values if results.has(name, case)]
         known = {name: results.values[name][case] for name in names}
         alike = np.flatnonzero(places.ravel() == pattern)
-        results.fill(alike, find_missing(known, last_cycles, drive, True))
+        results.fill(alike, find_missing(known, group.window * drive.period, drive, True))
     results.numerics[:] = {
         "engine": BATCH_ENGINE,
         "steps_per_cycle": refined.steps,

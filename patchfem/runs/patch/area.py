@@ -282,9 +282,10 @@ def may_peak_at_side(patch: AreaPatch) -> bool:
 
 
 def may_open_between_cells(pressure: np.ndarray) -> bool:
-    """Return whether a face whose cells (ny, nx) carry the pressure [Pa] may open in a square of less than four of them.
+    """Return whether a face in full contact may be open in a region smaller than a square of four cells.
 
-    The pressure then falls by more than the lowest one from cell to cell.
+    `pressure` (ny, nx) [Pa] is that of the cells. The region may exist where the pressure falls to its lowest value by more
+    than this value from one cell to the next, so that it reaches 0 within another cell.
     """
     row, column = np.unravel_index(np.argmin(pressure), pressure.shape)
     around = pressure[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]

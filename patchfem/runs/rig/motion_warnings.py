@@ -34,7 +34,7 @@ from .engines import ENGINES, find_obstacle_of_map
 N_STEADY_CHECK_CYCLES = 4
 SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 # Speed at half the friction limit of a law that creeps, relative to its reference speed: the inverse of tanh at 1/2.
-HALF_LIMIT_SPEED_RATIO = 0.5493
+HALF_LIMIT_SPEED_RATIO = np.arctanh(0.5)
 SINGLE_POINT_WARNING = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "

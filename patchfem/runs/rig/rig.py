@@ -624,5 +624,7 @@ def complete_measures(run: CoupledRun) -> CoupledRun:
     motion = (window, run.drive, repeat)
     measures |= reasons.find_invalid(measures, motion, outcome, is_rigid=is_rigid)
     other_modes = rig.first_mode.fraction_of_other_modes(window.modal)
-    measures |= reasons.find_missing(measures, window, run.drive, run.has_friction, other_modes)
+    measures |= reasons.find_missing(
+        measures, window.span, run.drive, run.has_friction, other_modes
+    )
     return replace(run, outcome=outcome, measures=measures)
