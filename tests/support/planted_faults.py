@@ -1,8 +1,9 @@
 """Share of planted faults that the quick tests notice.
 
-    python tests/support/planted_faults.py SEED COUNT --coverage FILE [--tree FOLDER]
+    python tests/support/planted_faults.py SEED COUNT --coverage FILE [--tree FOLDER] [--folders NAME ...]
 
-draws COUNT faults of one token each outside compiled kernels, an equal number of each kind in KINDS, plants one after
+draws COUNT faults of one token each outside compiled kernels (in some folders of the package, all by default), an equal
+number of each kind in KINDS, plants one after
 the other in the copy FOLDER of the repository, and runs the quick tests that execute the changed line. It prints a line
 for each fault, and the share that was noticed for each kind.
 
@@ -128,11 +129,13 @@ def list_faults(path: Path) -> list[Fault]:
     return faults
 
 
-def draw_faults(seed: int, count: int) -> list[Fault]:
-    """Return `count` faults, an equal number of each kind, drawn from the package without its kernels."""
+def draw_faults(seed: int, count: int, folders: list[str]) -> list[Fault]:
+    """Return `count` faults, an equal number of each kind, from folders of the package (all for []) without kernels."""
     found = []
     for path in sorted((ROOT / "patchfem").rglob("*.py")):
-        if not path.name.endswith("_kernels.py") and "compiled" not in path.parts:
+        parts = path.relative_to(ROOT).parts
+        is_chosen = not folders or parts[1] in folders
+        if is_chosen and not path.name.endswith("_kernels.py") and "compiled" not in parts:
             found += list_faults(path)
     generator = random.Random(seed)
     drawn = []
@@ -190,8 +193,9 @@ def main() -> None:
     parser.add_argument("count", type=int)
     parser.add_argument("--coverage", type=Path)
     parser.add_argument("--tree", type=Path, default=ROOT)
+    parser.add_argument("--folders", nargs="*", default=[])
     given = parser.parse_args()
-    faults = draw_faults(given.seed, given.count)
+    faults = draw_faults(given.seed, given.count, given.folders)
     if given.coverage is None:
         print(*faults, sep="\n")
         return

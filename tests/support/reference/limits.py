@@ -158,7 +158,8 @@ bands that yaw, shapes on either piece, a load that oscillates, heave and pitch,
 interfaces with or without patches, and wear. The rows below are the exceptions, whatever the law unless they name one.
 Method `auto` runs all of them. So does `march`, but for law 'coulomb' on grooves without partial slip, whose motion is
 computed from event to event. Methods `exact` and `harmonic` need a state of a fixed size; they refuse law nonlocal with
-another `order` than 1 or with reading 'report', and a motion that the message names.
+another `order` than 1 or with reading 'report'. Both refuse heave and pitch, and `harmonic` also
+loads that oscillate and bands that yaw; it needs a sine or a sweep of the frequency.
 """
 
 
