@@ -3,9 +3,8 @@
     python tests/support/planted_faults.py SEED COUNT --coverage FILE [--tree FOLDER] [--folders NAME ...]
 
 draws COUNT faults of one token each outside compiled kernels (in some folders of the package, all by default), an equal
-number of each kind in KINDS, plants one after
-the other in the copy FOLDER of the repository, and runs the quick tests that execute the changed line. It prints a line
-for each fault, and the share that was noticed for each kind.
+number of each kind in KINDS, plants one after the other in the copy FOLDER of the repository, and runs the quick tests
+that execute the changed line. It prints a line for each fault, and the share that was noticed for each kind.
 
 FILE is the data of `coverage run --source=patchfem -m pytest -n 0` with `dynamic_context = test_function`. Faults in
 lines that only subprocesses execute count as unnoticed.
