@@ -52,7 +52,8 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
 }
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
-patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected.
+patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected: square
+pieces are about 10 % too stiff under the load (`patchfem plan --probe` computes it).
 With `[contact.area]` the pieces are blocks in three dimensions. Their friction acts along x alone: slip across x and the
 coupling of pressure and shear stress of unequal pieces are neglected. If a mode yaws the face, each band of cells slides
 with the displacement of its middle.
