@@ -146,10 +146,17 @@ def draw_faults(seed: int, count: int, folders: list[str]) -> list[Fault]:
 
 
 def find_tests(fault: Fault, data, tree: Path) -> list[str]:
-    """Return the pytest names of the tests that execute the line of a fault, by the data of coverage."""
+    """Return the pytest names of the tests that execute the line of a fault, by the data of coverage.
+
+    For a line that is executed when the file is imported, they are the tests that execute any other line of the file.
+    """
     files = {path.stem: path.relative_to(tree) for path in (tree / "tests").rglob("test_*.py")}
+    contexts = data.contexts_by_lineno(str(tree / fault.path))
+    executing = set(contexts.get(fault.line, []))
+    if executing <= {""}:
+        executing = set().union(*contexts.values())
     names = set()
-    for context in data.contexts_by_lineno(str(tree / fault.path)).get(fault.line, []):
+    for context in executing:
         module, _, test = context.rpartition(".")
         if module in files:
             names.add(f"{files[module]}::{test}")
