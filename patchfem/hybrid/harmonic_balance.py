@@ -18,9 +18,10 @@ N_NODES = 48  # nodes of Gauss's rule over a branch of a loop, which is exact wh
 N_AMPLITUDES = 200  # amplitudes of the table of a law, evenly in the logarithm
 MIN_AMPLITUDE_RATIO = 1e-2  # smallest amplitude of this table, relative to the stretch before slip
 N_SUBSTITUTIONS = 60  # substitutions of the stiffness, each by half of its change
-# Height of a maximum of the first-harmonic balance that is examined, relative to the highest steady motion. For the damper
-# of the template the balance exceeds it by up to 70 %, and falls short of it by 7 %.
-MIN_HEIGHT_RATIO = 0.5
+# Height of the first-harmonic balance from which on a frequency is examined, relative to the highest steady motion. For the
+# damper of the template, whose second mode answers to the third harmonic, the balance exceeds the motion by up to 150 %
+# and falls short of it by 20 %.
+MIN_HEIGHT_RATIO = 0.7
 # Stretch of the element that stands for rigid friction, relative to the slide without friction
 RIGID_STRETCH_RATIO = 1e-2
 SUBSTITUTION_TOL = 1e-3  # relative change of all stiffnesses at which the substitutions end

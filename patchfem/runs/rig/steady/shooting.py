@@ -62,10 +62,10 @@ FREQUENCY_PATH = PathSettings(first_step=0.0125, max_step=0.05)
 WEAK_DRIVE = 1e-2
 MAX_LEVEL_RATIO = 10.0
 LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
-# Distance of a point beside the estimate of a peak, relative to its smaller width at 0.9 of its height, and ratio of both
-# widths above which the wider side is a shoulder
+# Distance of a point beside the estimate of a peak, relative to its smaller width at 0.9 of its height
 SIDE_POINT_FRACTION = 0.1
-SHOULDER_RATIO = 2.5
+# Smallest distance of further points from each other, relative to the larger width
+MIN_SPACING_IN_WIDTHS = 0.9
 
 
 class ShootingFinder:
@@ -454,13 +454,18 @@ class ShootingFinder:
         return float(np.linalg.eigvals(state).real.max())
 
     def trace_curve(self, drive) -> ResponseCurve:
-        """Compute the response curve over frequency, by continuation if it may have folds or if that of Iwan's law is drawn.
+        """Compute the response curve over frequency, by continuation if it may have folds or if Iwan's law is drawn.
 
-        Other curves start with N_SWEEP_POINTS frequencies and the natural frequencies. Each point starts from the motion at
-        the previous one. The curve is refined by `sample_adaptively`.
+        Other curves, and those of Iwan's law that are not followed to their end, start with N_SWEEP_POINTS frequencies and
+        the natural frequencies. Each point starts from the motion at the previous one. The curve is refined by
+        `sample_adaptively`.
         """
         if self.follows_curve:
-            return self._follow_curve(drive)
+            curve = self._follow_curve(drive)
+            if self.may_fold or not curve.notes:
+                return curve
+            # A curve without folds that was not followed to its end is sampled, and refined by its frequencies.
+            self.follows_curve = False
         if not self.draws_curve:
             try:
                 points = self._estimate_peaks(drive)
@@ -513,19 +518,30 @@ class ShootingFinder:
             start = periodic.Start(balanced.make_start(self.make_case(sine)))
             top = self.compute_curve_point(sine, start, needs_stability=False)
 
-            # A point beside it in the range, and one at the end of a shoulder, where another peak may be higher
+            # A point beside it in the range
             points.append(top)
             sides = (slice(k, None), slice(k, None, -1))
             spans = [np.abs(omega[side] - omega[k]) for side in sides]
             widths = [measure_peak_width(heights[side], span) for side, span in zip(sides, spans)]
             self.estimated_width = min(filter(None, widths))
-            wide = max(widths)
-            steps = [SIDE_POINT_FRACTION * self.estimated_width]
-            steps += [wide] * (wide > SHOULDER_RATIO * self.estimated_width)
-            for step in steps if widths[0] == wide else [-step for step in steps]:
-                beside = replace(sine, omega=float(omega[k] + step))
-                start = top.guess.start
-                points.append(self.compute_curve_point(beside, start, needs_stability=False))
+            step = SIDE_POINT_FRACTION * self.estimated_width
+            beside = replace(sine, omega=sine.omega + (step if widths[0] else -step))
+            points.append(self.compute_curve_point(beside, top.guess.start, needs_stability=False))
+
+            # Where the balance is too high, the highest motion may be in a part of the curve that it does not show. Points
+            # a width apart cover all frequencies at which it is high enough.
+            for side in sides:
+                before = top
+                for at, height in zip(omega[side], heights[side]):
+                    highest = max(point.values[AMPLITUDE] for point in points)
+                    if height < harmonic_balance.MIN_HEIGHT_RATIO * highest:
+                        break
+                    distances = [abs(point.drive.omega - at) for point in points]
+                    if min(distances) >= MIN_SPACING_IN_WIDTHS * max(widths):
+                        near = replace(sine, omega=float(at))
+                        start = before.guess.start
+                        before = self.compute_curve_point(near, start, needs_stability=False)
+                        points.append(before)
         return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
 
     def _follow_curve(self, drive) -> ResponseCurve:
