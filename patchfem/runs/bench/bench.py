@@ -9,7 +9,7 @@ from time import process_time
 
 import numpy as np
 
-from ...core import Response
+from ...core import Response, max_abs
 from ...motion_measures import energy_balance
 from ...response.loops import (
     choose_reversal_force_rule,
@@ -180,7 +180,7 @@ def _compute_measures(model, histories: SlideHistories, cycle_start: int) -> Val
 
     def find_peak(values) -> float:
         """Return the largest magnitude of a history (k,)."""
-        return float(np.abs(values).max()) if is_sampled else compute_peak(values)
+        return max_abs(values) if is_sampled else compute_peak(values)
 
     # Energy balance: work - change of stored energy - dissipated + created = 0.
     work, stored, dissipated, created = histories.ledger

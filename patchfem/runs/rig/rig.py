@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import compiled, structure
 from ...convergence import convergence_error
-from ...core import Measure, NotConverged, Outcome, PatchfemError
+from ...core import Measure, NotConverged, Outcome, PatchfemError, max_abs
 from ...model import rig as model_rig
 from ...response import reasons, stationary
 from ...response.decay_curve import DecayCurve
@@ -242,7 +242,7 @@ class CoupledRun:
         limit = 0.0
         if self.has_friction and not varies:
             limit = self.model.friction.static * first_interface_load(self.model, self.patch)
-        return float(np.abs(self.solution.run.response.force).max()) / limit if limit > 0 else 0.0
+        return max_abs(self.solution.run.response.force) / limit if limit > 0 else 0.0
 
     @property
     def has_errors(self) -> bool:
@@ -573,7 +573,7 @@ def _find_peak_frequency(solution: Solution, coarser=()) -> Measures:
         return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK_REASON)}
     drives = [one.steady.drive for one in (solution, *coarser)]
     peak, *others = [float(one.omega / (2 * np.pi)) for one in drives if one is not None]
-    shift = float(np.abs(np.array(others) - peak).max(initial=0.0))
+    shift = max_abs(np.array(others) - peak)
     error = steady.peak_error + convergence_error(shift)
     measures = {"peak_frequency": Measure(peak, "Hz", error, 0.0)}
     width = steady.data.width

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core import Measure, NotConverged
+from ....core import Measure, NotConverged, max_abs
 from ....response.errors import compute_absolute_changes
 from ....response.rows import AMPLITUDE
 from ...results.patch_rows import Arrays
@@ -145,7 +145,7 @@ class CurveInProgress:
     def find_widest_shift(self, k: int) -> PeakShift:
         """Return the shift of a peak that lies anywhere between the neighbours of the point with an index."""
         x = np.array(self.positions)
-        distance = float(np.abs(x[max(k - 1, 0) : k + 2] - x[k]).max())
+        distance = max_abs(x[max(k - 1, 0) : k + 2] - x[k])
         return PeakShift(self.positions[k], distance, distance or 1.0)
 
     def convert_to_frequency(self, k: int, distance: float) -> float:

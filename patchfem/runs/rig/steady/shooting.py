@@ -13,7 +13,7 @@ from time import process_time
 import numpy as np
 
 from .... import compiled
-from ....core import NotConverged, Outcome, PatchfemError, SineDrive
+from ....core import NotConverged, Outcome, PatchfemError, SineDrive, max_abs
 from ....formatting import format_length
 from ....hybrid import cases, harmonic_balance, periodic
 from ....hybrid.laws import is_rigid, masing
@@ -224,7 +224,7 @@ class ShootingFinder:
         outcome = Outcome.STUCK if is_stuck else run.outcome or Outcome.STEADY
         if motion.grows:
             outcome = Outcome.GROWS
-        elif float(np.abs(run.extremes).max()) > self.model.rig.springs.travel:
+        elif max_abs(run.extremes) > self.model.rig.springs.travel:
             outcome = Outcome.EXCEEDS_TRAVEL
         if not (is_stuck or motion.grows or motion.is_stable):
             outcome = Outcome.NOT_CONVERGED
