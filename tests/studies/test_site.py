@@ -61,9 +61,8 @@ def test_always_glossary_lists_measures_and_terms_once():
     headings = re.findall(r"^(\S[^\n]*)\n  \S", made.glossary(), re.M)
     assert len(headings) == len(set(headings)) > 90
     terms = made.glossary_terms()
-    assert {row.name.replace("_", " ") for row in (*made.PATCH_TABLE.values(), *made.MOTION_MEASURE_ROWS)} | set(terms) == set(
-        headings
-    )
+    rows = (*made.PATCH_TABLE.values(), *made.MOTION_MEASURE_ROWS)
+    assert {row.name.replace("_", " ") for row in rows} | set(terms) == set(headings)
     assert terms["slide"] != terms["slip"] and "Irreversible part" in terms["slip"]
 
 
