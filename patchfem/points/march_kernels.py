@@ -118,7 +118,8 @@ def march_cases(steps, parameters, laws, record):
             while left > 0 and n_pieces < MAX_PIECES:
                 n_pieces += 1
                 finds_events = n_events < MAX_EVENTS
-                piece = advance(body, at, (direction, tangent), left, finds_events)
+                slope = direction, tangent
+                piece = advance(body, at, slope, left, finds_events, not observes)
                 n_events = n_events + 1 if piece.has_event else 0
                 phasor += observe_piece(body, piece, energies, loop)
                 if observes:
@@ -126,8 +127,9 @@ def march_cases(steps, parameters, laws, record):
                     observe_motion(body, piece, seen)
                     third += integrate(body, piece, 3)
                     mean += integrate(body, piece, 0).real
-                at = commit(body, piece)
+                at = piece.last
                 if observes:
+                    at = commit(body, piece)
                     observe_ends(piece, at, seen)
                 direction = piece.direction
                 tangent = piece.tangent

@@ -35,10 +35,10 @@ STOP_ROUND_OFF = 1e-10
 MAX_STEP_PHASE = 1.0  # largest phase of the vibration of a sticking point in an exact step [rad]
 MAX_STEPS = 256  # largest number of exact steps per cycle
 MAX_ROOT_STEPS = 60  # secants and bisections for an event
-# Change of the instant of an event, relative to the step, after which the next secant would change it by less than
-# round-off, and of a smooth law by less than the error of the step
-ROOT_TOLERANCE = 1e-9
-SMOOTH_ROOT_TOLERANCE = 1e-4
+# Product of the last two changes of the instant of an event, relative to the step, by about which the next secant would
+# change it: round-off, and for a smooth law less than the error of the step
+ROOT_TOLERANCE = 1e-14
+SMOOTH_ROOT_TOLERANCE = 1e-5
 # Steps per cycle at which the shortest step is a radian of the vibration above a stiff law, or the time of its relaxation
 REFERENCE_STEPS = 16.0
 # Velocity relative to the speed of a law above which its force changes by less than 2e-5
@@ -320,19 +320,18 @@ def move(body, direction, first, dt):
 
 
 @njit(**NJIT_CALL)
-def take_step(body, first, dt):
-    """Return the `Instant` after a step of order 4 by the method of Runge, Kutta and Nystroem, without its force.
+def take_step(case, law, first, dt):
+    """Return the `Instant` after a step of order 4 by the method of Runge, Kutta and Nystroem, with force of its last stage.
 
     Parameters
     ----------
-    body : Body
+    case : (12,) array
+    law : PointLaw
     first : Instant
         Start of the step.
     dt : float
         Duration [s].
     """
-    case = body.case
-    law = body.law
     kind = law.numbers[LawNumber.LAW]
     half = 0.5 * dt
     turn = rotate(case[Number.OMEGA] * half)
@@ -360,12 +359,14 @@ def take_step(body, first, dt):
     slide = first.slide + dt * v + dt * dt / 6 * (a + a_1 + a_2)
     velocity = v + dt / 6 * (a + 2 * a_1 + 2 * a_2 + a_3)
     power = first.force * v + 2 * force_1 * v_1 + 2 * force_2 * v_2 + force_3 * v_3
-    return Instant(phase, slide, velocity, a_3, 0.0, slide, dt / 6 * power)
+    return Instant(phase, slide, velocity, a_3, force_3, slide, dt / 6 * power)
 
 
-@njit(**NJIT_CALL)
+@njit(**NJIT_KERNEL)
 def reach(body, direction, first, dt):
     """Return the `Instant` at a time after another one on the same curve of the law.
+
+    Force and acceleration of a smooth law are those of the last stage of the step. `finish` computes those at its end.
 
     Parameters
     ----------
@@ -378,10 +379,47 @@ def reach(body, direction, first, dt):
         The time [s].
     """
     if is_linear(body):
-        at = move(body, direction, first, dt)
-    else:
-        at = take_step(body, first, dt)
-    return finish(body, direction, first, at, dt, False)
+        return finish(body, direction, first, move(body, direction, first, dt), dt, False)
+    return take_step(body.case, body.law, first, dt)
+
+
+@njit(**NJIT_CALL)
+def sample(body, direction, ends, dt, time):
+    """Return the `Instant` at a time after the start of a piece, with the force of the law.
+
+    The slide of a smooth law is the polynomial of order 5 through slide, velocity and acceleration at both ends.
+
+    Parameters
+    ----------
+    body : Body
+        With the memory of its law at the start of the piece.
+    direction : float
+        Direction of slip of a law that is linear between events, 0 during stick.
+    ends : (Instant, Instant)
+        Ends of the piece.
+    dt : float
+        Duration of the piece [s].
+    time : float
+        Time since its start [s].
+    """
+    first, last = ends
+    if is_linear(body):
+        return reach(body, direction, first, time)
+    # Distances of slide, velocity and acceleration at the end from the parabola at the start, times powers of dt
+    part = time / dt
+    v = first.velocity * dt
+    bend = 0.5 * first.acceleration * dt * dt
+    rise = last.slide - first.slide - v - bend
+    slope = last.velocity * dt - v - 2 * bend
+    turn = last.acceleration * dt * dt - 2 * bend
+    c_3 = 10 * rise - 4 * slope + 0.5 * turn
+    c_4 = -15 * rise + 7 * slope - turn
+    c_5 = 6 * rise - 3 * slope + 0.5 * turn
+    q = part * (v + part * (bend + part * (c_3 + part * (c_4 + part * c_5))))
+    rate = v + part * (2 * bend + part * (3 * c_3 + part * (4 * c_4 + part * 5 * c_5)))
+    phase = first.phase * rotate(body.case[Number.OMEGA] * time)
+    at = make_instant(phase, first.slide + q, rate / dt, 0.0, body.case)
+    return finish(body, direction, first, at, time, False)
 
 
 @njit(**NJIT_KERNEL)
@@ -435,7 +473,10 @@ def locate(body, branch, ends, dt, goal, level):
     if start * end < 0:
         time = dt * start / (start - end)
     for _ in range(MAX_ROOT_STEPS):
-        at = reach(body, branch.direction, first, time)
+        if goal == SHARE:
+            at = sample(body, branch.direction, ends, dt, time)
+        else:
+            at = reach(body, branch.direction, first, time)
         miss = read(body, branch, at, goal, level)
         if miss * end < 0:
             low = time
@@ -446,7 +487,7 @@ def locate(body, branch, ends, dt, goal, level):
             following = time - miss * (time - before) / (miss - miss_before)
         if miss == 0:
             break
-        if abs(following - time) <= tolerance * dt:
+        if abs(following - time) * abs(time - before) <= tolerance * dt * dt:
             return min(max(following, low), high)
         before = time
         miss_before = miss
@@ -586,7 +627,7 @@ def find_first_direction(body):
 
 
 @njit(**NJIT_KERNEL)
-def advance(body, at, before, left, finds_events):
+def advance(body, at, before, left, finds_events, commits):
     """Return the next `Piece` of a motion.
 
     Parameters
@@ -601,6 +642,8 @@ def advance(body, at, before, left, finds_events):
         Time to the end of the cycle [s].
     finds_events : bool
         Whether the piece ends at an event.
+    commits : bool
+        Whether the memory of a smooth law goes on to the end of the piece.
     """
     direction, tangent = before
     first = Instant(at.phase, at.slide, at.velocity, at.acceleration, at.force, at.slip, 0.0)
@@ -637,13 +680,16 @@ def advance(body, at, before, left, finds_events):
             dt = locate(body, branch, (first, last), dt, VELOCITY, 0.0)
             at = reach(body, direction, first, dt)
             at = Instant(at.phase, at.slide, 0.0, 0.0, 0.0, at.slip, at.work)
-            last = finish(body, direction, first, at, dt, False)
+            last = finish(body, direction, first, at, dt, False) if is_linear(body) else at
             after = change_direction(body, last, direction)
         passes = abs(last.slide - first.slide) > branch.path
         if passes:
             dt = locate(body, branch, (first, last), dt, PATH, branch.path)
             last = reach(body, direction, first, dt)
             after = sign
+
+    if not is_linear(body):
+        last = finish(body, direction, first, last, dt, commits)
 
     # At a reversal the force of a rigid point jumps from one sign to the other, or takes many values.
     turns = turns and not passes

@@ -2,7 +2,7 @@
 
 Integrals of the slide over a piece of a law that is linear between events are exact. Those of a smooth law are the rule of
 two points that is exact for polynomials of order 5, from slide, velocity and acceleration at both ends. A piece ends where
-the velocity changes its sign, or where the acceleration jumps. What lies between the ends is found by `reach`.
+the velocity changes its sign, or where the acceleration jumps. What lies between the ends is found by `sample`.
 
 `case`, `energies`, `seen` and `loop` are rows of one case, see `rows`.
 """
@@ -13,7 +13,7 @@ from typing import NamedTuple
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from .law_kernels import find_share
-from .motion_kernels import SHARE, find_rest, is_linear, locate, reach, rotate
+from .motion_kernels import SHARE, find_rest, is_linear, locate, rotate, sample
 from .rows import Energy, Law, LawNumber, Loop, Number, Seen
 
 STEP_ROUND_OFF = 1e-9  # distance of a parabola from the ends of a piece relative to its width
@@ -80,7 +80,7 @@ def integrate_wave(piece, n, turn):
     if n == 0:
         return complex(turn, 0.0)
     change = raise_wave(piece.last.phase, n) - raise_wave(piece.first.phase, n)
-    return complex(change.imag, -change.real) / n
+    return complex(change.imag / n, -change.real / n)
 
 
 @njit(**NJIT_KERNEL)
@@ -129,7 +129,7 @@ def integrate(body, piece, n):
     end = raise_wave(last.phase, -n)
 
     # The integral of a slide at rest is exact, so that it does no work.
-    plain = integrate_wave(piece, -n, turn) / omega
+    plain = integrate_wave(piece, -n, turn) * (1 / omega)
     direction = piece.branch.direction
     rest = first.slide
     if not is_linear(body):
@@ -147,7 +147,7 @@ def integrate(body, piece, n):
     push += begin * (first.velocity + (rate + damping) * (first.slide - rest))
     resistance = complex(stiffness - n * n * omega * omega, n * omega * damping)
     size = resistance.real**2 + resistance.imag**2
-    return push * resistance.conjugate() / size + rest * plain
+    return push * resistance.conjugate() * (1 / size) + rest * plain
 
 
 @njit(**NJIT_KERNEL)
@@ -247,15 +247,18 @@ def read_signal(body, piece, part, weights):
     """
     at = piece.first if part == 0 else piece.last
     if 0 < part < 1:
-        at = reach(body, piece.branch.direction, piece.first, part * piece.duration)
+        ends = piece.first, piece.last
+        dt = piece.duration
+        at = sample(body, piece.branch.direction, ends, dt, part * dt)
     return weights[0] * at.force + weights[1] * at.acceleration + weights[2] * at.phase.imag
 
 
 @njit(**NJIT_CALL)
-def find_peak(body, piece, weights):
-    """Return the largest magnitude in a piece of a sum of force, acceleration of the slide and sine of the drive.
+def find_peak(body, piece, weights, known):
+    """Return the largest magnitude so far of a sum of force, acceleration of the slide and sine of the drive.
 
-    The parabola through the middle shows an extreme between the ends.
+    The parabola through both ends and the middle of a piece shows an extreme between them. An extreme that cannot be the
+    largest one is not searched: one that exceeds the parabola by less than the range of its three values.
 
     Parameters
     ----------
@@ -263,18 +266,21 @@ def find_peak(body, piece, weights):
     piece : Piece
     weights : (float, float, float)
         Weights of force, acceleration and sine.
+    known : float
+        Largest magnitude before the piece.
     """
     centre = 0.5
     half = 0.5
-    peak = 0.0
+    peak = known
     for _ in range(1 + N_PARABOLAS):
         before = read_signal(body, piece, centre - half, weights)
         middle = read_signal(body, piece, centre, weights)
         after = read_signal(body, piece, centre + half, weights)
         vertex = find_vertex(before, middle, after)
         if half == 0.5:
-            peak = max(abs(before), abs(after))
-            if not vertex.is_near:
+            peak = max(known, abs(before), abs(after))
+            spread = max(before, middle, after) - min(before, middle, after)
+            if not vertex.is_near or vertex.largest + spread < known:
                 return peak
         centre += half * vertex.offset
         half *= 0.25
@@ -361,18 +367,18 @@ def observe_motion(body, piece, seen):
     # The irreversible slide turns where there is no force, and so no stretch.
     zero = find_crossing(body, piece, shares, 0.0) if begin < 0 else -1.0
     if zero >= 0:
-        slip = reach(body, direction, first, zero * dt).slide
+        slip = sample(body, direction, (first, piece.last), dt, zero * dt).slide
         seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], slip)
         seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], slip)
 
     # Forces of other laws have their extremes at the ends of pieces.
     output = case[Number.OUTPUT]
-    peak = find_peak(body, piece, (0.0, output, case[Number.BASE]))
-    seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
+    weights = 0.0, output, case[Number.BASE]
+    seen[Seen.MAX_ACCELERATION] = find_peak(body, piece, weights, seen[Seen.MAX_ACCELERATION])
     law = numbers[LawNumber.LAW]
     if law == Law.TANH or law == Law.LUGRE:
-        peak = find_peak(body, piece, (1.0, 0.0, 0.0))
-        seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], peak)
+        weights = 1.0, 0.0, 0.0
+        seen[Seen.MAX_FORCE] = find_peak(body, piece, weights, seen[Seen.MAX_FORCE])
 
 
 @njit(**NJIT_KERNEL)

@@ -57,7 +57,7 @@ N_BOUND_STEPS = 200_000  # steps that are timed for the bound
 HEADINGS = {
     "first": ("first run of", "compiling [CPU s]", "second run [CPU s]"),
     "scenes": ("first run of every shipped scene", "compiling [CPU s]", "second run [CPU s]"),
-    "step": ("step of the engine, law", "us per step", "bound [us]"),
+    "step": ("step of the engine, law", "us per step", "least us of its operations"),
     "cases": ("sweep", "cases per CPU s", "within the tolerance [%]"),
     "peer": ("one run", "time [ms]", "DOP853 with events [ms]"),
 }

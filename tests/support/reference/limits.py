@@ -52,7 +52,8 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
 }
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
-patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected.
+patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected: square
+pieces are about 10 % too stiff under the load (`patchfem plan --probe` computes it).
 With `[contact.area]` the pieces are blocks in three dimensions. Their friction acts along x alone: slip across x and the
 coupling of pressure and shear stress of unequal pieces are neglected. If a mode yaws the face, each band of cells slides
 with the displacement of its middle.
@@ -158,7 +159,8 @@ bands that yaw, shapes on either piece, a load that oscillates, heave and pitch,
 interfaces with or without patches, and wear. The rows below are the exceptions, whatever the law unless they name one.
 Method `auto` runs all of them. So does `march`, but for law 'coulomb' on grooves without partial slip, whose motion is
 computed from event to event. Methods `exact` and `harmonic` need a state of a fixed size; they refuse law nonlocal with
-another `order` than 1 or with reading 'report', and a motion that the message names.
+another `order` than 1 or with reading 'report'. Both refuse heave and pitch, and `harmonic` also
+loads that oscillate and bands that yaw; it needs a sine or a sweep of the frequency.
 """
 
 
