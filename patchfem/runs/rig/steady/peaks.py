@@ -143,13 +143,13 @@ class CurveInProgress:
         return np.where(counts, np.nan_to_num(collect_amplitudes(self.points)), 0.0)
 
     def find_widest_shift(self, k: int) -> PeakShift:
-        """Return the shift of a peak that lies anywhere between the neighbours of the point with an index."""
+        """Return the shift of a peak that lies anywhere between the neighbours of the point `k`."""
         x = np.array(self.positions)
         distance = max_abs(x[max(k - 1, 0) : k + 2] - x[k])
         return PeakShift(self.positions[k], distance, distance or 1.0)
 
     def convert_to_frequency(self, k: int, distance: float) -> float:
-        """Return the change of the frequency [Hz] over a distance along the curve from the point with an index."""
+        """Return the change of the frequency [Hz] over a distance along the curve from the point `k`."""
         omega = np.array([point.drive.omega for point in self.points[max(k - 1, 0) : k + 2]])
         steps = np.diff(self.positions[max(k - 1, 0) : k + 2])
         slope = np.abs(np.diff(omega) / steps).max(initial=0.0, where=steps > 0)
@@ -289,8 +289,9 @@ def _find_vertex(x, y, k: int) -> _Vertex | None:
     nearest = np.argsort(np.where(y > 0, np.abs(distance), np.inf))[:N_VERTEX_POINTS]
     used = np.union1d(np.arange(k - 1, k + 2), nearest)[: N_VERTEX_POINTS + 1]
     used = used[y[used] > 0]
-    curve = np.polynomial.Polynomial.fit(
-        distance[used] / scale, (y[k] / y[used]) ** 2, used.size - 1
+    # Points that nearly coincide do not determine all coefficients; the fit then has the smallest ones, which is no defect.
+    curve, _ = np.polynomial.Polynomial.fit(
+        distance[used] / scale, (y[k] / y[used]) ** 2, used.size - 1, full=True
     )
     roots = curve.deriv().roots()
     places = roots[np.isreal(roots)].real
