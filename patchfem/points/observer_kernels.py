@@ -325,7 +325,7 @@ def find_time_above(begin, level, crossing):
     return crossing if begin > level else 1 - crossing
 
 
-@njit(**NJIT_KERNEL)
+@njit(**NJIT_CALL)
 def observe_motion(body, piece, seen):
     """Add a piece of the window to `seen`: its stick, turns of the slip, and extremes of acceleration and force inside.
 
