@@ -278,7 +278,8 @@ class Start(NamedTuple):
         It is the nearer one where the laws are in different regimes, or remember different numbers of reversal points.
         """
         near = self if fraction < 0.5 else other
-        first, second = self.state, other.state
+        first = self.state
+        second = other.state
         columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG, Memory.COUNT]
         if not np.array_equal(first.memory[:, columns], second.memory[:, columns]):
             return near

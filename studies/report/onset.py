@@ -100,8 +100,10 @@ def make_table(onsets: list[Onset]) -> str:
     heads = " | ".join(f"{frequency} Hz" for frequency in FREQUENCIES)
     lines = [
         "# Onset of slip by model, criterion and frequency",
-        "`onset.py` generates this page. The numbers are levels of the base acceleration in g, ± the width to which the "
-        "level is halved, if it is at least 0.005 g. " + ANSWER,
+        "`onset.py` generates this page. The numbers are levels of the base acceleration in g at which slip begins by a "
+        "criterion: `slip`, an interface slips irreversibly; `distortion`, the third harmonic of the acceleration exceeds "
+        "3 % of the first; `gauge`, the block moves by more than 0.01 mil to each side. ± is half the distance of the "
+        "levels before and after the onset, if it is at least 0.005 g. " + ANSWER,
         "",
         f"| model | criterion | {heads} |",
         "|---|---|" + "---|" * len(FREQUENCIES),

@@ -260,14 +260,14 @@ def list_parts(folder: Path | None) -> dict[str, Callable[[], Iterator[Row]]]:
     return parts | {"conclusions": make_conclusions}
 
 
-def format_rows(rows: list[Row]) -> list[str]:
-    """Return a Markdown table of rows."""
+def format_rows(rows: list[Row], folder: Path = FOLDER) -> list[str]:
+    """Return a Markdown table of rows, for a page in a folder."""
     lines = [
         "| place | what | printed | computed | error | study | verdict |",
         "|---|---|---|---|---|---|---|",
     ]
     for row in rows:
-        study = f"[{row.study}](../{row.study})"
+        study = f"[{row.study}]({relpath(STUDIES / row.study, folder)})"
         lines.append(f"| {' | '.join(row[:5])} | {study} | {row.verdict} |")
     return lines
 
@@ -283,11 +283,11 @@ def make_page(found: dict[str, list[Row]], folder: Path) -> str:
         "",
     ]
     lines += [
-        f"Of the [{len(ITEMS)} items of the report](items.md) the program computes: {texts}.",
+        f"Of the [{len(ITEMS)} items of the report]({relpath(FOLDER / 'items.md', folder)}) the program computes: {texts}.",
         "",
     ]
     for part, rows in found.items():
-        lines += [f"## {part}", *format_rows(rows), ""]
+        lines += [f"## {part}", *format_rows(rows, folder), ""]
         if part in FIGURES:
             picture = find_picture(STUDIES / rows[0].study, folder)
             lines += [f"![{FIGURES[part][1]}, computed]({relpath(picture, folder)})", ""]

@@ -70,6 +70,18 @@ def test_exact_rounded_ends_are_read_with_depths(tmp_path):
     assert np.all(write_and_read_pair(make_pair("mixed"), tmp_path).lower.interface_depths == 0)
 
 
+def test_always_middle_of_interface_is_origin(tmp_path):
+    """A pair that is drawn elsewhere along x is the same pair."""
+    pairs = []
+    for shift in (0.0, 3e-3):
+        mesh = make_pair("mixed")
+        mesh.points[:, 0] += shift
+        pairs.append(write_and_read_pair(mesh, tmp_path))
+    for side in ("lower", "upper"):
+        first, second = (getattr(pair, side).points for pair in pairs)
+        assert second == pytest.approx(first, abs=1e-15)
+
+
 @pytest.mark.parametrize("name", ["pair.msh", "pair.vtu"])
 @pytest.mark.parametrize("kind", ELEMENT_KINDS)
 def test_exact_mesh_pair_round_trip(kind, name, tmp_path):

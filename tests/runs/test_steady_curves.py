@@ -206,3 +206,13 @@ def test_exact_curve_of_iwan_law_with_five_modes_agrees_with_march():
         found = pf.run(IWAN_MODES + sine, **{"accuracy.method": "march"}).measures[AMPLITUDE]
         assert abs(found.value - point.values[AMPLITUDE]) <= found.error + 1e-8 * found.value
         assert found.error <= 3e-5 * found.value
+
+
+def test_exact_case_whose_maxima_share_points_has_peak_of_run():
+    """A flat first-harmonic balance has several maxima; the peak of a sweep's case is that of the drawn curve."""
+    scene = pf.new("shroud")
+    joint = {"structure.mode.flap.slide": 0.2598, "drive.force": "2 N"}
+    run = pf.run(scene, **joint)
+    sweep = pf.sweep(scene, {key: [value] for key, value in joint.items()})
+    assert sweep[AMPLITUDE].item() == pytest.approx(run.measures[AMPLITUDE].value, rel=1e-5)
+    assert sweep[f"{AMPLITUDE}_error"].item() < 1e-3 * sweep[AMPLITUDE].item()

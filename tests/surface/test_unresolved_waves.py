@@ -8,7 +8,7 @@ import pytest
 from synthetic import waves
 
 from patchfem.surface import Profile, describe_lost_waves
-from patchfem.surface.spectrum import wave_spectrum
+from patchfem.surface.spectrum import MIN_ELEMENTS_PER_WAVE, wave_spectrum
 
 LENGTH = 12.7e-3
 X = np.linspace(0, LENGTH, 4001)
@@ -27,6 +27,14 @@ def test_exact_fine_fraction_of_three_waves(length, fraction):
     """The fine fraction of three waves is the root of the squares of the waves shorter than the given length."""
     spectrum = wave_spectrum(make_cosines([6, 40, 300], [3.0, 2.0, 1.0]))
     assert spectrum.lost_fraction(length) == pytest.approx(fraction / np.sqrt(14), abs=1e-9)
+
+
+@pytest.mark.parametrize("kept, order", [(0.74, 300), (0.7, 40), (0.41, 40), (0.4, 6)])
+def test_exact_longest_element_keeps_fraction_of_height(kept, order):
+    """Two elements span the shortest wave that may not be lost; waves of rms 1 and sqrt(5) of sqrt(14) are shorter."""
+    spectrum = wave_spectrum(make_cosines([6, 40, 300], [3.0, 2.0, 1.0]))
+    wave = spectrum.element_length(kept) * MIN_ELEMENTS_PER_WAVE
+    assert wave == pytest.approx(2 * LENGTH / order)
 
 
 def test_exact_lost_waves_are_reported_with_remedy():

@@ -32,6 +32,12 @@ def test_exact_parameters_of_sine():
     assert found["Sm"] == pytest.approx(400 * UM, rel=1e-6)
 
 
+def test_exact_mean_line_is_crossed_between_samples():
+    """The mean length of the elements of a few waves does not depend on where samples lie in a wave."""
+    z = UM * np.sin(2 * np.pi * (np.arange(130) + 0.3) / 37.3)
+    assert compute_parameters(z, UM)["Sm"] == pytest.approx(37.3 * UM, rel=1e-4)
+
+
 def test_exact_sections_of_growing_sine():
     """Rz is the mean over whole sections, Rt belongs to the whole trace, and Rz = Rp + Rv."""
     x = np.arange(999)

@@ -514,6 +514,9 @@ class ShootingFinder:
             highest = max((point.values[AMPLITUDE] for point in points), default=0.0)
             if heights[k] < harmonic_balance.MIN_HEIGHT_RATIO * highest:
                 break
+            # Of two points at one frequency, no peak could be interpolated
+            if omega[k] in [point.drive.omega for point in points]:
+                continue
             sine = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
             start = periodic.Start(balanced.make_start(self.make_case(sine)))
             top = self.compute_curve_point(sine, start, needs_stability=False)
