@@ -51,6 +51,7 @@ from .export.surfaces import compare as compared
 from .export.surfaces import roughness, worn
 from .export.sweeps import dataset as sweep_datasets
 from .export.sweeps import run as sweep_run
+from .formatting import format_quantity
 from .mesh import files as mesh_files
 from .model.model import Model, build_without_sweep
 from .model.model import build as build_model
@@ -1511,11 +1512,21 @@ class Plots:
     def curve(self, ax: Axes | None = None) -> Axes:
         """Plot the response curve: amplitude and acceleration of the steady motions against frequency or level.
 
-        With `ax`, only the amplitude is drawn.
+        With `ax`, only the amplitude is drawn, in the units of what the axes show already. The legend names the drive level.
         """
         no_curve = 'the run has no response curve; use drive.waveform = "sweep" with accuracy.method = "harmonic"'
         reason = self._explain_missing_motion() or no_curve
-        return self._draw(ax, "curve", ("Steady motions",), reason)
+        return self._draw(ax, "curve", ("Steady motions",), reason, self._name_drive_level())
+
+    def _name_drive_level(self) -> str:
+        """Return the drive level of a response curve for the legend, such as "drive 5 N"; "" if it is not one level."""
+        levels = runs.make_run_answer(self._result).data.get("curve_level")
+        if levels is None or len(set(levels.values.tolist())) != 1:
+            return ""
+        rig = self._result.plan.model.rig
+        is_force = rig.drive.kind == "force"
+        unit, factor = ("N", rig.modes.mass) if is_force else ("m s-2", 1.0)
+        return f"drive {format_quantity(factor * float(levels.values[0]), unit, 4)}"
 
     @property
     def charts(self) -> list[str]:
@@ -1560,16 +1571,19 @@ class Plots:
             return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]"
         return "no motion was computed"
 
-    def _draw(self, ax: Axes | None, name: str, titles: tuple[str, ...], reason: str) -> Axes:
+    def _draw(
+        self, ax: Axes | None, name: str, titles: tuple[str, ...], reason: str, label: str = ""
+    ) -> Axes:
         """Plot the charts with some titles for which the run has data, and return the first Axes.
 
         With `ax`, only the first chart is drawn. Raises PatchfemError with `reason` if the run has no data for any of
         them.
 
-        `titles` are those of the charts, and `name` is that of the method, for the message.
+        `titles` are those of the charts, `name` is that of the method, for the message, and `label` names the run in the
+        legend.
         """
         answer = runs.make_run_answer(self._result)
-        axes_of_chart = chart_axes.draw_charts(answer, titles, ax, f"plot.{name}")
+        axes_of_chart = chart_axes.draw_charts(answer, titles, ax, f"plot.{name}", label)
         if axes_of_chart is None:
             raise PatchfemError(f"plot.{name}: nothing to draw: {reason}")
         return axes_of_chart

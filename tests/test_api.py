@@ -1,6 +1,6 @@
 """The Python interface: the same numbers as the command line, settings of any type, printed and drawn results."""
 
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from scene_texts import BENCH, COULOMB, LINEAR, POINT, SHORT, SMALL_PATCH, STRUC
 
 import patchfem as pf
 from patchfem import api
+from patchfem.export.charts import panel as chart_panel
 from patchfem.export.runs import make_quantities
 from patchfem.runs import describe_measure
 
@@ -322,3 +323,17 @@ def test_always_every_chart_of_page_is_drawn_by_title(results, tmp_path):
     for draw in (result.plot.chart, lambda title: pf.plot.folder(folder, title)):
         with pytest.raises(pf.PatchfemError, match="Energy"):
             draw("none of these")
+
+
+def test_always_curve_on_axes_has_their_units():
+    """A chart that is drawn on axes with values in a larger unit is drawn in this unit, with its own label kept."""
+    panel = chart_panel.Panel(
+        "", "line", chart_panel.Axis("f [kHz]", 1e-3), chart_panel.Axis("a [um]", 1e6), []
+    )
+    curve = chart_panel.Curve("first", np.array([1.0, 2.0]), np.array([597.0, 1.0]))
+    drawn = chart_panel.use_units(replace(panel, curves=[curve]), "f [Hz]", "amplitude [mm]")
+    np.testing.assert_allclose(drawn.curves[0].x, [1000.0, 2000.0])
+    np.testing.assert_allclose(drawn.curves[0].y, [0.597, 0.001])
+    assert (drawn.x.label, drawn.y.label) == ("f [Hz]", "a [mm]")
+    other = chart_panel.use_units(replace(panel, curves=[curve]), "time [s]", "")
+    assert other.curves[0].y[0] == 597.0 and other.y.label == "a [um]"

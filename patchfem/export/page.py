@@ -120,7 +120,18 @@ def _read_all(folders: list[Path]) -> Answers:
     if len({"run" if answer.is_run else answer.kind for answer in answers.values()}) > 1:
         kinds = ", ".join(f"{name}: {answer.kind}" for name, answer in answers.items())
         raise PatchfemError(f"report: the folders have results of different kinds ({kinds})")
-    return answers
+    return _sort_by_drive_level(answers)
+
+
+def _sort_by_drive_level(answers: Answers) -> Answers:
+    """Return response curves in the order of their drive levels, and other answers in the given order."""
+    levels = {}
+    for name, answer in answers.items():
+        level = answer.data.get("curve_level")
+        if level is None or "curve_frequency" not in answer.data:
+            return answers
+        levels[name] = level.values.max()
+    return {name: answers[name] for name in sorted(levels, key=levels.__getitem__)}
 
 
 def _list_measures(answers: Answers) -> tuple[list[tuple[str, list[str], str]], list[str]]:

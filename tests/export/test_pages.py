@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -34,7 +35,9 @@ from scene_texts import (
     SWEEP,
 )
 
-from patchfem.export import quantities
+from patchfem.export import page, quantities, store
+from patchfem.export.charts import panels
+from patchfem.export.rows import CHARTS
 
 LEVELS = DRIVE.replace(
     'acceleration = "5 g"', 'waveform = "levels"\nlevels = ["3 g", "5 g", "6 g"]'
@@ -206,3 +209,17 @@ def test_always_page_works_in_browser(folders, chromium):
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         count = page.evaluate("document.querySelectorAll('.chart .main-svg').length")
         assert count >= len(read_charts(read_page(folders(name))))
+
+
+def test_exact_response_curves_stand_in_order_of_their_levels(folders):
+    """On a page, response curves are sorted by drive level on a logarithmic axis, and their chart is the first one."""
+    answer = store.read_answer(folders("curve"))
+    level = answer.data["curve_level"]
+    answers = {}
+    for factor in (3, 4, 0.5):
+        scaled = replace(level, values=factor * level.values)
+        answers[f"{factor}"] = replace(answer, data=answer.data | {"curve_level": scaled})
+    ordered = page._sort_by_drive_level(answers)
+    panel = panels.make_panels(ordered, CHARTS[answer.kind])[0]
+    assert [curve.name for curve in panel.curves] == ["0.5", "3", "4"]
+    assert panel.title == "Steady motions" and panel.y.is_log

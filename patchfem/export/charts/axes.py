@@ -10,7 +10,8 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
 from ..answer import Answer
 from ..rows import CHARTS
-from .panels import Panel, make_panels
+from .panel import Panel, use_units
+from .panels import make_panels
 from .plotly import ERROR_BAND_OPACITY, Figure, make_traces
 
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
@@ -51,6 +52,8 @@ def draw_panel(panel: Panel, axes):
     """
     if panel.choices:
         return draw_panel(panel.choices[0], axes)
+    if axes.has_data():
+        panel = use_units(panel, axes.get_xlabel(), axes.get_ylabel())
     traces = make_traces(panel)
     for trace in traces[-1:] if panel.style == "film" else traces:
         if "z" in trace:
@@ -61,7 +64,7 @@ def draw_panel(panel: Panel, axes):
         axes.axvline(position, color="0.5", lw=1, ls=":")
     axes.set(title=panel.title, xlabel=panel.x.label, ylabel=panel.y.label)
     axes.set(**{f"{name}scale": "log" for name in "xy" if getattr(panel, name).is_log})
-    if sum(bool(curve.name) for curve in panel.curves) > 1 and panel.style != "map":
+    if len(axes.get_legend_handles_labels()[1]) > 1 and panel.style != "map":
         axes.legend()
     return axes
 
@@ -190,7 +193,7 @@ def list_titles(answer: Answer) -> list[str]:
     return list(dict.fromkeys(chart.title for chart in charts))
 
 
-def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
+def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str, label: str = ""):
     """Draw the charts of an answer with some titles, and return the first Axes; None if it has none of them.
 
     Parameters
@@ -203,6 +206,8 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
         Where to draw the first chart alone; None for a new figure with all of them.
     caller : str
         Function that the message about wrong `axes` names, such as "plot.loop".
+    label : str, optional
+        Name of the answer in the legend.
 
     Raises
     ------
@@ -210,7 +215,7 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str):
         If `axes` are not those of matplotlib.
     """
     charts = [chart for chart in CHARTS[answer.kind] if not titles or chart.title in titles]
-    panels = make_panels({"": answer}, tuple(charts))
+    panels = make_panels({label: answer}, tuple(charts))
     return draw_panels(panels, axes, caller) if panels else None
 
 

@@ -1,11 +1,11 @@
 """A chart with its data in display units, which plotly.js or matplotlib draws."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
-from ..quantities import choose_scale
+from ..quantities import DISPLAY_UNIT_LADDERS, choose_scale
 
 MAX_CURVE_INTERVALS = 3000  # largest number of intervals of which a curve keeps the extremes
 
@@ -129,6 +129,43 @@ def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) ->
     size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     unit, scale = choose_scale(name, unit or "1", size)
     return Axis(f"{label} [{unit}]" if unit else label, scale, is_log)
+
+
+def use_units(panel: Panel, x_label: str, y_label: str) -> Panel:
+    """Return a panel of curves in the units of the labels of axes on which something is drawn already.
+
+    A unit of another quantity is left as it is, and so is a map.
+    """
+    if panel.style in ("map", "film"):
+        return panel
+    x_factor = _find_factor(panel.x.unit, Axis(x_label).unit)
+    y_factor = _find_factor(panel.y.unit, Axis(y_label).unit)
+    curves = []
+    for curve in panel.curves:
+        ends = {name: getattr(curve, name) for name in ("y", "low", "high")}
+        ends = {name: values * y_factor for name, values in ends.items() if values is not None}
+        curves.append(replace(curve, x=curve.x * x_factor, **ends))
+    return replace(
+        panel,
+        x=panel.x if x_factor == 1 else replace(panel.x, label=_replace_unit(panel.x, x_label)),
+        y=panel.y if y_factor == 1 else replace(panel.y, label=_replace_unit(panel.y, y_label)),
+        curves=curves,
+        marks=[mark * x_factor for mark in panel.marks],
+    )
+
+
+def _find_factor(unit: str, other: str) -> float:
+    """Return the number of another display unit in a unit of the same quantity; 1 for another quantity."""
+    for ladder in DISPLAY_UNIT_LADDERS.values():
+        scales = dict(ladder)
+        if {unit, other} <= scales.keys():
+            return scales[other] / scales[unit]
+    return 1.0
+
+
+def _replace_unit(axis: Axis, label: str) -> str:
+    """Return the label of an axis with the unit of another label."""
+    return f"{axis.label.partition(' [')[0]} [{Axis(label).unit}]"
 
 
 def select_curve_points(values: np.ndarray, count: int = MAX_CURVE_INTERVALS) -> np.ndarray:

@@ -62,7 +62,9 @@ def make_panel(answers: Answers, chart: Chart) -> Panel | None:
 
         return STYLE_FUNCTIONS[chart.style](answers, chart)
     if len(answers) > 1:
-        chart = replace(chart, by="")
+        # response curves of several drive levels are compared at all their heights
+        log = "y" if chart.x == "curve_frequency" else chart.log
+        chart = replace(chart, by="", log=log)
     selected = {}
     for name, answer in answers.items():
         selected[name] = _select_span(_reduce_faces(answer.data, chart), chart)
