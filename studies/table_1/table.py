@@ -390,8 +390,8 @@ def head(rows: dict) -> list:
         "A score is the root mean square of ln(computed/measured); smaller scores are better. Three scores separated "
         "by slashes are those of all readings / accelerations / displacements. For comparison: the logarithms of "
         "repeated readings of the same acceleration scatter with a standard deviation of .086. Two names say what the "
-        'accelerometer is taken to show: "√2 x fundamental", or "peak x stuck", the peak times the gain measured '
-        "while the block sticks.",
+        'accelerometer is taken to show: "√2 x fundamental", or "peak x stuck", the peak times the ratio of reading '
+        "to input while the block sticks.",
         "**Models that the data exclude.** Friction alone does not explain the data. The scores of a rigid "
         f"block are {three(one['rigid']['fitted'])} at 143 Hz. The scores of a patch with yaw are "
         f"{three(one['patch']['fitted'])} at 143 Hz and {three(one['patch']['others'])} at the other frequencies. A "

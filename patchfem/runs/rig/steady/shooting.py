@@ -268,9 +268,12 @@ class ShootingFinder:
             try:
                 motion = self.find_periodic_motion(drive, guess and guess.start)
             except NotConverged:
-                if not self.may_fold:
-                    raise
                 motion = None
+                if not self.may_fold:
+                    # A neighbour of a point of a curve may be too far away as a start.
+                    if guess is None:
+                        raise
+                    motion = self.find_periodic_motion(drive)
         if not self.may_fold or (motion is not None and (motion.is_stable or motion.grows)):
             return motion, ()
 
