@@ -11,6 +11,7 @@ the first of three events, which are found as roots of what `reach` returns:
 `case` is a row of one case in the order of `rows.Number`.
 """
 
+from enum import IntEnum
 from math import atan2, cos, exp, inf, nan, pi, sin, sqrt
 from typing import NamedTuple
 
@@ -45,8 +46,20 @@ REFERENCE_STEPS = 16.0
 FLAT_SPEED = 6.0
 # Part of the way there that a step may take, so that it does not pass it if the acceleration grows
 APPROACH = 0.7
-# What is 0 at the root that `locate` finds
-VELOCITY, ACCELERATION, PATH, SHARE = range(4)
+
+
+class Goal(IntEnum):
+    """Quantity that is 0 at an event.
+
+    - VELOCITY, ACCELERATION: of the slide
+    - PATH: from the start of the piece, beyond a level
+    - SHARE: irreversible part of the motion, beyond a level
+    """
+
+    VELOCITY = 0
+    ACCELERATION = 1
+    PATH = 2
+    SHARE = 3
 
 
 class Instant(NamedTuple):
@@ -238,7 +251,16 @@ def find_kinetic(body):
 
 @njit(**NJIT_KERNEL)
 def find_hold(body, phase, q):
-    """Return the force [N] that keeps a point at rest at a slide `q` [m], at a `phase` exp(i w t) of the drive."""
+    """Return the force [N] that keeps a point at rest.
+
+    Parameters
+    ----------
+    body : Body
+    phase : complex
+        exp(i w t) of the drive.
+    q : float
+        Slide [m].
+    """
     case = body.case
     return (case[Number.DRIVE] * phase.imag - case[Number.STIFFNESS] * q) / case[Number.MOBILITY]
 
@@ -431,16 +453,15 @@ def read(body, branch, at, goal, level):
     body : Body
     branch : Branch
     at : Instant
-    goal : int
-        VELOCITY, ACCELERATION, PATH from the start of the piece or SHARE, the irreversible part of the motion.
+    goal : Goal
     level : float
         Path or part that is subtracted.
     """
-    if goal == VELOCITY:
+    if goal == Goal.VELOCITY:
         return at.velocity
-    if goal == ACCELERATION:
+    if goal == Goal.ACCELERATION:
         return at.acceleration
-    if goal == PATH:
+    if goal == Goal.PATH:
         return abs(at.slide - branch.start) - level
     return find_share(at, branch, body.law.numbers) - level
 
@@ -457,7 +478,7 @@ def locate(body, branch, ends, dt, goal, level):
         Ends of the piece, of which the last one is behind the event.
     dt : float
         Duration of the piece [s].
-    goal : int
+    goal : Goal
         The quantity, as in `read`.
     level : float
         Its level, as in `read`.
@@ -473,7 +494,7 @@ def locate(body, branch, ends, dt, goal, level):
     if start * end < 0:
         time = dt * start / (start - end)
     for _ in range(MAX_ROOT_STEPS):
-        if goal == SHARE:
+        if goal == Goal.SHARE:
             at = sample(body, branch.direction, ends, dt, time)
         else:
             at = reach(body, branch.direction, first, time)
@@ -670,21 +691,21 @@ def advance(body, at, before, left, finds_events, commits):
         # A velocity that falls and rises again may turn on the way.
         falls = sign * first.acceleration < 0 and sign * last.acceleration > 0
         if falls and sign * last.velocity > 0:
-            part = locate(body, branch, (first, last), dt, ACCELERATION, 0.0)
+            part = locate(body, branch, (first, last), dt, Goal.ACCELERATION, 0.0)
             lowest = reach(body, direction, first, part)
             if sign * lowest.velocity < -STOP_ROUND_OFF * dt * abs(last.acceleration):
                 dt = part
                 last = lowest
         turns = sign * last.velocity < 0
         if turns:
-            dt = locate(body, branch, (first, last), dt, VELOCITY, 0.0)
+            dt = locate(body, branch, (first, last), dt, Goal.VELOCITY, 0.0)
             at = reach(body, direction, first, dt)
             at = Instant(at.phase, at.slide, 0.0, 0.0, 0.0, at.slip, at.work)
             last = finish(body, direction, first, at, dt, False) if is_linear(body) else at
             after = change_direction(body, last, direction)
         passes = abs(last.slide - first.slide) > branch.path
         if passes:
-            dt = locate(body, branch, (first, last), dt, PATH, branch.path)
+            dt = locate(body, branch, (first, last), dt, Goal.PATH, branch.path)
             last = reach(body, direction, first, dt)
             after = sign
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..compiled.jit import njit
 from .law_kernels import find_share
-from .motion_kernels import SHARE, find_rest, is_linear, locate, rotate, sample
+from .motion_kernels import Goal, find_rest, is_linear, locate, rotate, sample
 from .rows import Energy, Law, LawNumber, Loop, Number, Seen
 
 STEP_ROUND_OFF = 1e-9  # distance of a parabola from the ends of a piece relative to its width
@@ -304,7 +304,7 @@ def find_crossing(body, piece, shares, level):
     if (shares[0] > level) == (shares[1] > level):
         return -1.0
     ends = piece.first, piece.last
-    return locate(body, piece.branch, ends, piece.duration, SHARE, level) / piece.duration
+    return locate(body, piece.branch, ends, piece.duration, Goal.SHARE, level) / piece.duration
 
 
 @njit(**NJIT_KERNEL)
