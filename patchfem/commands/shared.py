@@ -99,7 +99,7 @@ Out = out_option("folder of the results, such as out/mine")
 Quiet = flag_option("print only errors", "-q", "--quiet")
 Units = text_option('units of x and z if a file gives none or wrong ones, such as "mm,um"')
 NoPage = flag_option("leave out report.html", "--no-page")
-Plot = path_option("write also the first picture, such as loop.png (.png, .svg or .pdf)", "--plot")
+Plot = path_option("write also the main chart, such as loop.png (.png, .svg or .pdf)", "--plot")
 Verbose = flag_option("print all numbers", "-v", "--verbose")
 
 

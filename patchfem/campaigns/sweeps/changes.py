@@ -76,7 +76,14 @@ def analyse(table: SweepTable) -> SweepAnalysis:
     for name in MAIN_MEASURES if is_comparable else ():
         if name in table.measures:
             ranges += find_range(table, name)
-    ranges.sort(key=lambda entry: -entry.relative)
+    # of response curves, the height of the peak is what is asked for
+    is_curve = "peak_frequency" in table.measures
+    ranges.sort(
+        key=lambda entry: (
+            not (is_curve and entry.measure == "relative_displacement_amplitude"),
+            -entry.relative,
+        )
+    )
     return SweepAnalysis(
         cases=table.count_cases(),
         ranges=ranges,

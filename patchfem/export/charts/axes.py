@@ -169,7 +169,9 @@ def find_picture_format(path: Path) -> str:
 
 
 def write_plot(answer: Answer, path: Path) -> None:
-    """Write the first chart of an answer, and of a backbone all three charts, as .png, .svg or .pdf.
+    """Write the main chart of an answer, and of a backbone all three charts, as .png, .svg or .pdf.
+
+    It is the first chart of the page, and of a sweep the measure that the answer names first.
 
     Raises
     ------
@@ -182,6 +184,8 @@ def write_plot(answer: Answer, path: Path) -> None:
     panels = make_panels({"": answer}, CHARTS[answer.kind])
     if not panels:
         raise PatchfemError(f"{path}: this answer has no chart")
+    # of a sweep, one measure in its unit comes before the ratios of all of them
+    panels.sort(key=lambda panel: panel.style == "relative")
     with write_atomically(path) as partial:
         figure = make_figure(panels[: N_PICTURE_CHARTS.get(answer.kind, 1)])
         save_figure(figure, partial, ending)

@@ -38,7 +38,7 @@ def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
 
 
 def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
-    """Return the headline: the measure that changes most, by how much, and with which key, and how the main ones change."""
+    """Return the headline: by how much the first measure and the main ones change, and with which key."""
     counts = analysis.cases
     n_known = counts["count"] - counts["unfinished"] - counts["failed"]
     if n_known < 2:
@@ -50,7 +50,10 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
         return f"No main measure of {n_known} cases changes by more than its error."
 
     first, *others = analysis.ranges
-    clauses = [f"changes most: {_describe_range(table, analysis, first)}"]
+    # the height of a response curve comes first even if another measure changes more
+    is_largest = all(first.relative >= entry.relative for entry in others)
+    verb = "changes most" if is_largest else "changes"
+    clauses = [f"{verb}: {_describe_range(table, analysis, first)}"]
     for entry in others:
         if refine.is_main(entry.measure):
             words = _describe_range(table, analysis, entry)

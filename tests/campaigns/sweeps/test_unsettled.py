@@ -161,3 +161,16 @@ def test_exact_first_sentence_names_each_main_measure():
     assert "loop area from 5.59 at 1 to 9.99 at 3 (largest, 10, at 3.1, 3.09" in sentence
     assert "; within 5 % of it from 2.4" in sentence and " to 3.76" in sentence
     assert sentence.endswith("; absolute acceleration peak by no more than its error.")
+
+
+def test_exact_first_sentence_of_response_curves_begins_with_their_height():
+    """With peaks of response curves the displacement amplitude comes first, even if another measure changes more."""
+    x = np.linspace(1.0, 5.0, 9)
+    columns = {
+        "friction_force_peak": 100 * x,
+        "relative_displacement_amplitude": 10 + x,
+        "peak_frequency": np.full(9, 2.0),
+    }
+    table = make_table({"normal.load": x}, columns, errors=1e-3)
+    sentence = make_verdict(table, analyse(table))[0]
+    assert sentence.startswith("With normal.load, relative displacement amplitude changes: from 11")
