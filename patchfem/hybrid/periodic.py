@@ -63,7 +63,7 @@ MAX_NEWTON_STEPS = 20  # Newton steps to a motion from a similar one
 # Largest ratio of the changes over a period after and before such a step at which the derivatives are updated. Further
 # steps with these derivatives take a period each, new derivatives take one for each unknown.
 MAX_BROYDEN_RATIO = 0.3
-# Largest number of shortened Newton steps, and of Newton steps with new derivatives
+# Largest number of shortened Newton steps, and of Newton steps with new derivatives, before a search is given up
 MAX_DETOURS = 3
 MIN_STOP = 1e-9  # shortest rest of rigid friction that is counted, in periods
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion

@@ -352,7 +352,7 @@ def _read_files(paths: dict[str, Path], table, is_base_driven: bool) -> _Reduced
     if not is_base_driven:
         return _ReducedFiles(values, rows, None, [])
 
-    # Rows that a base moves along x.
+    # Rows of the boundary coordinates that the base moves along x.
     notes = []
     moved = table.moved
     if moved is None and places is not None:

@@ -206,7 +206,7 @@ class PointLaw(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What is recorded of c cases.
+    """Observed values of c cases, over the measured cycles and at their ends.
 
     - energies (c, 2, 6): see `Energy`; the second row of a case is that at the start of the last cycle
     - seen (c, 19): see `Seen`

@@ -6,8 +6,9 @@ draws COUNT faults of one token each outside compiled kernels (in some folders o
 number of each kind in KINDS, plants one after the other in the copy FOLDER of the repository, and runs the quick tests
 that execute the changed line. It prints a line for each fault, and the share that was noticed for each kind.
 
-FILE is the data of `coverage run --source=patchfem -m pytest -n 0` with `dynamic_context = test_function`. Faults in
-lines that only subprocesses execute count as unnoticed.
+FILE is the data of `coverage run --source=patchfem -m pytest -n 0` with `dynamic_context = test_function` (coverage is
+installed by pip). Faults in lines that only subprocesses execute count as unnoticed, and so do those that change nothing,
+such as >= in place of > between numbers that are never equal.
 """
 
 import argparse

@@ -120,8 +120,8 @@ def _find_load(model: Model, patch) -> dict:
     if model.rig is None or not model.rig.friction.load_varies:
         return {}
 
-    # Without pressure, the gap at the approach of the preload is g - C f. The rotational spring of the holder is in series
-    # with the pitch, as a compliance x_i x_j/K in addition to that of the pieces.
+    # Without pressure, the gap at the approach of the preload is g - C f. The rotational spring K of the holder is in
+    # series with the pitch: it adds the compliance x_i x_j/K at the places x_i of the nodes to that of the pieces.
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     compliance = patch.pieces.normal
     spring = model.patch.loading.rotational_stiffness

@@ -274,7 +274,7 @@ def add_mesh_errors(
             )
         return curve, (f"the errors of the decay curve include {lacks}, because {reason}",)
 
-    # Linear interpolation over the logarithm of the amplitude
+    # The columns are interpolated linearly over the logarithm of the amplitude
     places = np.log(at)
     own = np.log(curve.amplitude)
     errors = [np.interp(places, places[known], row[known]) for row in errors]

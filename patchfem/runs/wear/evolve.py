@@ -160,7 +160,7 @@ class _Wear:
         return make_initial_wear_state(self.problem, depth)
 
     def jump(self, state: WearState) -> WearState:
-        """Return the state after the next jump, which ends early if a coating is worn through."""
+        """Return the state of wear after the next jump of cycles; the jump ends early if a coating is worn through."""
 
         def jump_to(cycle: float) -> WearState:
             """Compute the state after a jump that ends at a given cycle or earlier."""
