@@ -93,6 +93,20 @@ class RunLimit(NamedTuple):
     bytes: float = DEFAULT_MAX_BYTES
 
 
+class RunControl(NamedTuple):
+    """What the caller of a run has set.
+
+    - limit: CPU time and memory that all passes together may take.
+    - say, progress: callbacks for a line of text and for the completed fraction, or None.
+    - estimate: whether to estimate the errors from coarser runs.
+    """
+
+    limit: RunLimit
+    say: Callable[[str], None] | None = None
+    progress: Callable[[float], None] | None = None
+    estimate: bool = True
+
+
 # of meshes, which have a largest predicted time of their own
 NO_LIMIT = RunLimit(inf, 0.0, bytes=inf)
 

@@ -248,7 +248,7 @@ class CoupledRun:
     def has_errors(self) -> bool:
         """Whether errors are estimated: the caller wants them, the motion was found, and all meshes for them exist."""
         is_solved = self.solution.run.outcome is not Outcome.NOT_CONVERGED
-        return self.inputs.estimate and is_solved and self.inputs.has_error_meshes
+        return self.inputs.control.estimate and is_solved and self.inputs.has_error_meshes
 
 
 def run_motion(inputs: RunInputs) -> Result:
@@ -450,19 +450,18 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
     rig = model.rig
     size = np.inf if rig is None else rig.displacement_scale
     stage = "bench" if rig is None else "march"
-    runner = Runner(
-        model, inputs.patches, inputs.stiffer, inputs.progress, is_single=not inputs.estimate
-    )
+    limit, say, progress, estimate = inputs.control
+    runner = Runner(model, inputs.patches, inputs.stiffer, progress, is_single=not estimate)
     n_frames = N_INTERFACE_FRAMES * (inputs.patch is not None or model.has_interface_patches)
-    first = runner.solve(numerics, inputs.say, n_frames)
+    first = runner.solve(numerics, say, n_frames)
     inputs.seconds.update({stage: first.seconds} | first.prepare)
 
     # The window must contain a complete period of the motion, and the run two of them.
     n_cycles = _count_slip_cycles(model, first)
     if numerics.window < n_cycles <= numerics.cycles / 2:
         numerics = replace(numerics, window=n_cycles)
-        first = runner.solve(numerics, inputs.say, n_frames)
-    if not inputs.estimate or first.run.outcome is Outcome.NOT_CONVERGED:
+        first = runner.solve(numerics, say, n_frames)
+    if not estimate or first.run.outcome is Outcome.NOT_CONVERGED:
         measures = add_errors(first.values, size=size) | _find_peak_frequency(first)
         return CoupledRun(inputs, numerics, first, measures), None
 
@@ -480,7 +479,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
         if coarser is not None:
             # This run has twice the steps of the one before, with which it is compared.
             runner.solutions[coarser.numerics] = coarser.solution
-            solution = runner.solve(numerics, inputs.say, n_frames)
+            solution = runner.solve(numerics, say, n_frames)
             inputs.seconds[stage] = solution.seconds
         time_runs = comparisons.list_time_runs(numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
@@ -493,7 +492,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
             return run
         return _add_coarser_runs(run, [*time_runs, *space_runs], runner.solutions)
 
-    run, shortage = refine.refine(solve, numerics, _judge, inputs.limit)
+    run, shortage = refine.refine(solve, numerics, _judge, limit)
     inputs.seconds["error"] = sum(solution.seconds for solution in runner.solutions.values())
     peak = _find_peak_frequency(run.solution, runner.solutions.values())
     return replace(run, measures=run.measures | peak), shortage
