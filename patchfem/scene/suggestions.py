@@ -25,7 +25,6 @@ from .lines import split_key
 SIMILAR_NAME_RATING = 0.75
 # Rating of a table with the name of an unknown key, above all other ratings
 SAME_NAME_RATING = 2.0
-MIN_TABLE_RATING = 0.5  # rating above which a table is suggested
 
 
 class UnknownKey(NamedTuple):
@@ -225,7 +224,8 @@ def _suggest_table(model: type[Table], key: str, value: TomlValue) -> str:
         return known + SIMILAR_NAME_RATING * (name in similar) + SAME_NAME_RATING * is_same
 
     best = max((*similar, *tables), key=rate, default="")
-    return best if best and rate(best) > MIN_TABLE_RATING else ""
+    # Rating above which a table is suggested
+    return best if best and rate(best) > 0.5 else ""
 
 
 def _list_similar(key: str, names: Collection[str]) -> list[str]:
