@@ -18,11 +18,11 @@ from typing import NamedTuple, get_origin
 
 from ..core import PatchfemError
 from .keys import quantities
+from .keys.lines import split_assignment, split_key
 from .keys.lookup import LIMITS_BY_ERROR_TYPE, validate_value
 from .keys.removed import describe_removed
 from .keys.types import Key, list_keys, list_required_keys
 from .keys.values import TomlTable, TomlValue
-from .lines import split_assignment, split_key
 from .reader import is_toml, read_set_value
 from .suggestions import require_key
 

@@ -15,8 +15,8 @@ import numpy as np
 from ..effects import find_waveform
 from .files import list_named_files, require_files
 from .keys.contact import MAX_ANGLE_BETWEEN_PIECES
+from .keys.lines import find_scene_value
 from .keys.types import KeyValue, Table
-from .lines import find_scene_value
 from .reader import apply_set
 from .rules.contact import find_max_load
 from .rules.outlines import find_flat_length

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ..effects import join_words
 from .keys.choices import find_selectors, split_keys
+from .keys.lines import split_key
 from .keys.lookup import find_key, validate_values
 from .keys.removed import describe_removed
 from .keys.tables import Tables
@@ -19,7 +20,6 @@ from .keys.types import (
     list_required_keys,
 )
 from .keys.values import TomlTable, TomlValue
-from .lines import split_key
 
 # Rating of a table whose name is similar to an unknown key. A table that knows all keys inside has 1.
 SIMILAR_NAME_RATING = 0.75

@@ -21,7 +21,7 @@ from ...disk.file_hashes import hash_named_files, iterate_texts
 from ...model.model import Model, build
 from ...model.structure import JOINT_WORDS, name_joint_source
 from ...scene.files import require_files
-from ...scene.lines import split_assignment
+from ...scene.keys.lines import split_assignment
 from ...scene.overrides import BaseScene, PlainNumbers
 from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
 
