@@ -11,8 +11,6 @@ from scipy.optimize import brentq
 from ..core import Measure
 from .cost import Cost
 
-# Settings that are lengths; others are counts, whose reciprocals count as lengths
-LENGTH_SETTINGS = ("element_size",)
 ORDER_RANGE = (0.05, 12.0)  # smallest and largest order that is looked for
 # Relative change of a value below which it counts as round-off, which has no order
 ROUND_OFF = 1e-11
@@ -54,7 +52,8 @@ def measure_convergence(runs: list[Cost], setting: str, name: str) -> Convergenc
     values = np.array([run.measures[name].value for run in fixed])
     scale = max(abs(finest.value), finest.floor, np.finfo(float).tiny)
     sizes = np.array([run.value for run in fixed], float)
-    if setting not in LENGTH_SETTINGS:
+    # Settings that are lengths; others are counts, whose reciprocals count as lengths
+    if setting not in ("element_size",):
         sizes = 1 / sizes
     order = None
     if len(values) > 2 and np.abs(np.diff(values[-3:])).min() > ROUND_OFF * scale:

@@ -19,12 +19,6 @@ MAX_RATIO_BLOCKS = 12  # largest number of blocks whose ratios show the scatter 
 MIN_RATIO_BLOCKS = 4  # smallest number of blocks
 # Smallest length of a block in the longest wave; shorter blocks are correlated
 MIN_BLOCK_WAVES = 2.0
-# Deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off.
-CUTOFF_TO_DEVIATION = 0.187
-# Standard deviation of a ratio due to tip, interpolation and datum
-RATIO_RELATIVE_DEVIATION = 0.004
-# Largest mean square of the noise, relative to that of a surface, at which the ratio after/before of the surfaces is known
-MAX_NOISE_OVER_SIZE = 0.5
 # Smallest length of a trace relative to the longest wave of the band
 MIN_TRACE_WAVES = 3.0
 MIN_STEPS_PER_WAVE = 4.0  # smallest length of the shortest wave of the band in steps
@@ -72,7 +66,8 @@ def compare_waves(
 
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
     lines = [_subtract_polynomial(line, 1) for line in lines]
-    deviations = [(0.0, CUTOFF_TO_DEVIATION * wave / step) for wave in WAVE_BAND]
+    # Deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off.
+    deviations = [(0.0, 0.187 * wave / step) for wave in WAVE_BAND]
     lines = [z - smooth(z, deviations[1]) for z in lines]
     passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, is_kept] for z in lines]
     slope_deviation = CUTOFF_TO_DEVIATION * SHORTEST_SLOPE_WAVE_STEPS
@@ -118,7 +113,9 @@ def _is_noise(error: float, squares: Sequence[np.ndarray]) -> bool:
     the sizes before and after wear.
     """
     smallest = min(block.mean() for block in squares)
-    return not smallest > 0 or error**2 > MAX_NOISE_OVER_SIZE * smallest
+    # Largest mean square of the noise, relative to that of a surface, at which the ratio
+    # after/before of the surfaces is known
+    return not smallest > 0 or error**2 > 0.5 * smallest
 
 
 def _divide_means(before, after, power: float) -> np.ndarray:
@@ -133,7 +130,8 @@ def _divide_means(before, after, power: float) -> np.ndarray:
     influence = after / second - before / first
     scatter = power * influence.std(ddof=1) / np.sqrt(len(before))
     student = float(special.stdtrit(len(before) - 1, 0.975))
-    width = student * float(np.hypot(scatter, RATIO_RELATIVE_DEVIATION))
+    # Standard deviation of a ratio due to tip, interpolation and datum
+    width = student * float(np.hypot(scatter, 0.004))
     return (second / first) ** power * np.exp([0.0, -width, width])
 
 
