@@ -372,7 +372,7 @@ class Measure:
     - reason: reason why the value or its error is None.
     - engine: method that computed the value; "" for the engine of the run.
     - parts: contribution to the error of each discretisation, such as "steps" or "mesh", from coarser runs
-      (`response.errors`); None if they are unknown.
+      (`measures.errors`); None if they are unknown.
     """
 
     value: float | None
@@ -433,7 +433,7 @@ class MeasureDefinition(NamedTuple):
     - sample_error: error due to sampling, multiplied by the number of samples per cycle.
     - group: group of related measures: motion, friction, energy, patch or wear.
     - larger_term: for a measure that is a small difference of larger terms, the name of these terms; otherwise "". The
-      tolerance times their size (`response.rows.find_larger_term`) is added to the floor.
+      tolerance times their size (`measures.rows.find_larger_term`) is added to the floor.
     - order: order of the sampling error of an exact motion in the sample spacing.
     - minimum: smallest possible value.
     - flags: sets to which the measure belongs, separated by blanks: "main" (the tolerance of a run applies to it),
@@ -443,7 +443,7 @@ class MeasureDefinition(NamedTuple):
       under a sine), "cycle" (a mean over whole cycles of a sine),
       "loop" (an integral or a peak of samples of the friction loop), "run" (a sum over the whole run),
       "phase" (an angle modulo pi), "scatter" (a statistical mean under a random drive).
-    - friction_scale: name of the size in `response.errors.compute_friction_errors` that is the error of the measure for a
+    - friction_scale: name of the size in `measures.errors.compute_friction_errors` that is the error of the measure for a
       relative error 1 of the friction force; "" if this is the value of the measure.
     """
 

@@ -1,7 +1,7 @@
 """Measures of a motion that several engines have: of what they observe in their steps, and of samples.
 
 In: `Observations` of one run or of many, energies, or samples. Out: values by name, NaN where a run does not have the
-measure. `response.rows` has the names, units and definitions of the measures.
+measure. `measures.rows` has the names, units and definitions of the measures.
 """
 
 from typing import NamedTuple

@@ -14,7 +14,7 @@ from enum import StrEnum
 from time import perf_counter, process_time
 from typing import NamedTuple
 
-from .. import compiled
+from .. import kernel_cache
 from ..core import Measure, NotConverged, PatchfemError
 from ..formatting import format_number
 from ..model.model import Model
@@ -183,13 +183,13 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
         result = None
         is_short = True
         while is_short and len(timings) < N_TIMINGS:
-            compile_seconds = compiled.COMPILE_SECONDS[0]
+            compile_seconds = kernel_cache.COMPILE_SECONDS[0]
             begin = (_measure_cpu_time(), perf_counter())
             result = _run_setting(setting, say)
             if result is None:
                 break
             timings.append((_measure_cpu_time() - begin[0], perf_counter() - begin[1]))
-            has_compiled = compiled.COMPILE_SECONDS[0] > compile_seconds
+            has_compiled = kernel_cache.COMPILE_SECONDS[0] > compile_seconds
             is_short = has_compiled or timings[-1][0] < MIN_SECONDS_TIMED_ONCE
 
         if result is None:

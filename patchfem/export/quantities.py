@@ -1,11 +1,11 @@
 """Definitions of all quantities, and how their numbers are displayed.
 
-The measures of runs are defined in `response.rows` and `runs.results.patch_rows`; rows.toml defines those of the other
+The measures of runs are defined in `measures.rows` and `runs.results.patch_rows`; rows.toml defines those of the other
 verbs. KEY_QUANTITY_NAMES lists the quantities that come first: in the tiles of a page, on the screen and in the first
 columns of a table.
 """
 
-from .. import response
+from .. import measures as run_measures
 from ..core import MeasureDefinition, remove_interface_number
 from ..formatting import (
     MAX_SIGNIFICANT_DIGITS,
@@ -80,7 +80,7 @@ def _find_row(name: str) -> Definition | MeasureDefinition | None:
     return (
         QUANTITIES.get(name)
         or patch_rows.PATCH_TABLE.get(name)
-        or response.rows.MOTION_TABLE.get(name)
+        or run_measures.rows.MOTION_TABLE.get(name)
     )
 
 
@@ -198,7 +198,7 @@ def _find_zero_limit(name: str, quantity: Quantity) -> float:
     It is the floor of its definition where that is smaller than the floor of the run, which a run raises to its tolerance.
     """
     base_name = remove_interface_number(name)
-    row = patch_rows.PATCH_TABLE.get(name) or response.rows.MOTION_TABLE.get(base_name)
+    row = patch_rows.PATCH_TABLE.get(name) or run_measures.rows.MOTION_TABLE.get(base_name)
     return quantity.floor if row is None else min(row.floor, quantity.floor)
 
 

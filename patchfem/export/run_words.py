@@ -8,7 +8,8 @@ from itertools import product
 
 import numpy as np
 
-from .. import response, structure
+from .. import measures as run_measures
+from .. import structure
 from ..core import Outcome, remove_interface_number
 from ..formatting import (
     UNIT_LADDERS,
@@ -176,7 +177,7 @@ def _describe_interfaces(result: Result, measures: Quantities, text: str) -> lis
         return []
     if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS):
         text += " (mean of the last cycles)"
-    message = response.outcome.OPEN_LOOP_MESSAGE
+    message = run_measures.outcome.OPEN_LOOP_MESSAGE
     if any(warning.startswith(message) for warning in result.warnings):
         text = "friction work of the last cycle {}"
     is_one = result.plan.model.patch is not None
@@ -209,8 +210,8 @@ def describe_outcome(result: Result, measures: Quantities, details: JsonObject) 
     if outcome is Outcome.TRANSIENT and _is_release(result):
         return "The run ended before the motion came to rest; raise drive.cycles to see more of it."
     if outcome is Outcome.TRANSIENT:
-        steady = result.measures.get(response.rows.STEADY_AMPLITUDE)
-        message = response.reasons.COMMON_PERIOD_MESSAGE
+        steady = result.measures.get(run_measures.rows.STEADY_AMPLITUDE)
+        message = run_measures.reasons.COMMON_PERIOD_MESSAGE
         if steady is not None and steady.reason.startswith(message):
             return f"Whether the motion is steady is unknown: {steady.reason}."
     if outcome is Outcome.STUCK and {"loop_area", "slip_amplitude"} & measures.keys():

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from ..core import PatchfemError
-from ..response.welch import average_segments, transform_segments
+from ..measures.welch import average_segments, transform_segments
 from .sinusoids import FittedModes, Limits, SinusoidFit, SinusoidProblem
 
 # order of the time derivative of the displacement, by the quantity of the response

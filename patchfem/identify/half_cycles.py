@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import HalfCycles, smooth_slopes
+from ..measures.decay_curve import HalfCycles, smooth_slopes
 from .sinusoids import MAX_EVALUATIONS, START_TOL, SinusoidProblem
 
 MIN_HALF_CYCLE_SAMPLES = 5  # smallest number of samples in a half cycle

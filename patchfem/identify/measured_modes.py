@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import DecayCurve, HalfCycles, fit_decay_curve, fit_slopes
+from ..measures.decay_curve import DecayCurve, HalfCycles, fit_decay_curve, fit_slopes
 from .decay import fit_decay
 from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, fit_driven_modes
 from .half_cycles import describe_missing_samples_at_end, find_half_cycles

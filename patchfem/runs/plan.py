@@ -263,7 +263,9 @@ BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide
 # Bytes per entry of an n x n array of n modes, of which there are matrices, mode shapes and those of the eigenvalue solver
 BYTES_PER_MODE_PAIR = 125.0
 BYTES_PER_DRIVE_ROW = 400.0  # per row of a recorded drive
-HYBRID_SAMPLES_PER_STORED_CYCLE = 400  # samples that the engine `hybrid` stores of a cycle
+EVENT_DRIVEN_SAMPLES_PER_STORED_CYCLE = (
+    400  # samples that the engine `event_driven` stores of a cycle
+)
 # Expected reversals per cycle, which are stored also for the cycles before the window
 REVERSALS_PER_CYCLE = 4.0
 
@@ -297,7 +299,7 @@ class HistoryBytes(NamedTuple):
 
 # Memory of the histories by engine
 HISTORY_BYTES = {
-    "hybrid": HistoryBytes(80.0, 140.0, 16.0),
+    "event_driven": HistoryBytes(80.0, 140.0, 16.0),
     "march": HistoryBytes(45.0, 50.0, 18.0),
 }
 
@@ -351,7 +353,7 @@ def _list_memory_parts_of_motion(plan: Plan, steps_key: str) -> list[MemoryPart]
     # Histories: all samples of the last cycles, and reversals and extremes of the cycles before.
     settings = engines.choose_numerics(plan.model)
     history = HISTORY_BYTES[plan.engine]
-    steps = settings.steps if plan.engine == "march" else HYBRID_SAMPLES_PER_STORED_CYCLE
+    steps = settings.steps if plan.engine == "march" else EVENT_DRIVEN_SAMPLES_PER_STORED_CYCLE
     samples = max(2, settings.window) * steps
     width = 2.0 * n_modes + 12 + 6 * len(plan.model.rig.friction.interfaces)
     n_reversals = min(REVERSALS_PER_CYCLE * drive.cycles, structure.drive_sizes.MAX_EARLY_SAMPLES)

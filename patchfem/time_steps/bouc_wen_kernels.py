@@ -7,9 +7,9 @@ changes along the path. A rising load gives the end of a step no more energy tha
 
 from math import exp, sqrt
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
 from ..friction.laws.bouc_wen_kernels import follow_path
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from .step_rows_kernels import WIDTH, Value
 
 # Relaxation over a step below which the first term of a series is exact to 1e-6

@@ -8,8 +8,8 @@ slide stretches its spring, which is a part of the path, so that no energy is cr
 
 from typing import NamedTuple
 
-from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_NO_REFCOUNT
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_NO_REFCOUNT
+from ..kernel_cache.jit import njit
 from .step_rows_kernels import VECTOR, WIDTH, CellRow, SliderRow, Value
 
 MIN_MOVE = 1e-290  # change of y [N] below which a cell does not move

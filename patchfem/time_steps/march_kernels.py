@@ -35,8 +35,8 @@ none.
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from . import flanks_kernels as flanks
 from . import laws_kernels as laws
 from . import lists_kernels as lists

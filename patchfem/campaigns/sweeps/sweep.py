@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ... import compiled
+from ... import kernel_cache
 from ...core import PatchfemError
 from ...model.model import Model
 from ...model.similar_models import SimilarModels
@@ -96,7 +96,7 @@ def compute_chunk(
         `work.extract` returns for each case.
     """
     # The cases are computed in groups, of which each may have its own engine. A batch numbers its cases from 0.
-    begin = perf_counter() - compiled.COMPILE_SECONDS[0]
+    begin = perf_counter() - kernel_cache.COMPILE_SECONDS[0]
     numbers = np.asarray(numbers, int)
     results = CaseResults.blank(len(numbers))
     extras = [None] * len(numbers)
@@ -109,7 +109,7 @@ def compute_chunk(
             # The title and the effects of similar models are the same.
             model = models.first if isinstance(models, SimilarModels) else models[case]
             extras[place] = work.extract(int(numbers[place]), model, part, case)
-    seconds = perf_counter() - compiled.COMPILE_SECONDS[0] - begin
+    seconds = perf_counter() - kernel_cache.COMPILE_SECONDS[0] - begin
     return seconds, (results, extras if work.extract is not None else [])
 
 

@@ -12,7 +12,7 @@ from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.changes import SweepAnalysis, analyse
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError, remove_interface_number
-from ...response import rows
+from ...measures import rows
 from ...runs.batch.case_results import FAILED_OUTCOME
 from ...runs.results.patch_rows import PATCH_TABLE as STATIC
 from ...runs.results.result import describe_measure

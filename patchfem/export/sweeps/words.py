@@ -8,7 +8,7 @@ from ...campaigns.sweeps.peaks import FREQUENCY_KEY, PeakOnLine
 from ...campaigns.sweeps.ranking import SobolIndex
 from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Outcome
-from ...response import rows
+from ...measures import rows
 from ...runs import refine
 from ..answer import Quantities, Quantity
 from ..quantities import format_quantity, format_value

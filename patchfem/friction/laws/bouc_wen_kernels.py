@@ -7,8 +7,8 @@ follows dy/dx = 1 - y^n on loading, y > 0, and dy/dx = 1 - (1 - 2 s) |y|^n on un
 from math import exp, log1p
 from typing import NamedTuple
 
-from ...compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
-from ...compiled.jit import njit
+from ...kernel_cache.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from ...kernel_cache.jit import njit
 
 NEARLY_SATURATED = 1e-3  # distance of y from 1 below which any exponent has a closed form
 SATURATED = 1e-14  # distance of |y| from 1 that is round-off

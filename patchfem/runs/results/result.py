@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import response
+from ... import measures as run_measures
 from ...core import (
     Measure,
     Outcome,
@@ -197,11 +197,11 @@ class MotionData(NamedTuple):
 
     period: float | None = None
     energies: Values = MappingProxyType({})
-    step_runs: "tuple[response.errors.StepRun, ...]" = ()
-    levels: "tuple[response.events.Level, ...]" = ()
-    events: "response.events.Events | None" = None
-    decay: "response.decay_curve.DecayCurve | None" = None
-    spectra: "response.stationary.Spectra | None" = None
+    step_runs: "tuple[run_measures.errors.StepRun, ...]" = ()
+    levels: "tuple[run_measures.events.Level, ...]" = ()
+    events: "run_measures.events.Events | None" = None
+    decay: "run_measures.decay_curve.DecayCurve | None" = None
+    spectra: "run_measures.stationary.Spectra | None" = None
     steady: SteadyData | None = None
 
 
@@ -282,7 +282,7 @@ def describe_measure(name: str, numbered_kind: str = "interface") -> str:
         return patch_rows.PATCH_TABLE[name].text
 
     first = remove_interface_number(name)
-    row = patch_rows.PATCH_TABLE.get(first) or response.rows.find_definition(name)
+    row = patch_rows.PATCH_TABLE.get(first) or run_measures.rows.find_definition(name)
     return row.text + (
         "" if first == name else f"; of {numbered_kind} {name.removeprefix(first + '_')}"
     )

@@ -12,7 +12,7 @@ import numpy as np
 from ...convergence import convergence_error
 from ...core import Outcome, frozen_array
 from ...formatting import format_length, format_number
-from ...response.errors import estimate_convergence_errors
+from ...measures.errors import estimate_convergence_errors
 from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
 from ..results.result import UNBOUNDED_OUTCOMES, WearHistory
 from .evolve import (

@@ -12,8 +12,8 @@ import numpy as np
 
 from ... import surface
 from ...core import Measure, Outcome
-from ...response.outcome import judge_outcome
-from ...response.rows import AMPLITUDE
+from ...measures.outcome import judge_outcome
+from ...measures.rows import AMPLITUDE
 from ..bench.slides import integrate_steps
 from ..interfaces import bands
 from ..results.interfaces import check_pieces_overlap
