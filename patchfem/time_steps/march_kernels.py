@@ -74,7 +74,8 @@ MAX_STALLS = 4  # iterations that do not halve the smallest residual, after whic
 # Largest residual of such a step relative to RESIDUAL, and that of lists, whose means have quadrature errors
 STALLED = 1e3
 LISTS_STALLED = 1e5
-LISTS_RESIDUAL = 1e3  # residual of lists relative to RESIDUAL: 1e-9 of the force, below the errors by which strips are joined
+# Residual of lists relative to RESIDUAL: 1e-9 of the force, below the errors by which strips are joined
+LISTS_RESIDUAL = 1e3
 LIST_CUTS = 30  # trials of a line search for lists
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest

@@ -66,17 +66,17 @@ def compare_waves(
 
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
     lines = [_subtract_polynomial(line, 1) for line in lines]
-    # Deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off.
-    deviations = [(0.0, 0.187 * wave / step) for wave in WAVE_BAND]
+    waves = (*WAVE_BAND, SHORTEST_SLOPE_WAVE_STEPS * step)
+    # The deviation of the Gaussian filter of ISO 16610-21 is .187 of its cut-off.
+    deviations = [(0.0, 0.187 * wave / step) for wave in waves]
     lines = [z - smooth(z, deviations[1]) for z in lines]
     passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, is_kept] for z in lines]
-    slope_deviation = CUTOFF_TO_DEVIATION * SHORTEST_SLOPE_WAVE_STEPS
-    slopes = [(np.diff(smooth(z, slope_deviation), axis=1) / step)[:, is_kept[1:]] for z in lines]
+    slopes = [(np.diff(smooth(z, deviations[2]), axis=1) / step)[:, is_kept[1:]] for z in lines]
 
     # White noise of each surface in the band of the amplitude, and behind the filter of the slope.
     white = noise / np.sqrt(2)
     band_noise = white * np.sqrt(2 * step * (1 / WAVE_BAND[0] - 1 / WAVE_BAND[1]))
-    slope_noise = white / step * np.sqrt(1 / (4 * np.sqrt(np.pi) * slope_deviation**3))
+    slope_noise = white / step * np.sqrt(1 / (4 * np.sqrt(np.pi) * deviations[2][1] ** 3))
     n_blocks = int(
         np.clip(length / (MIN_BLOCK_WAVES * WAVE_BAND[1]), MIN_RATIO_BLOCKS, MAX_RATIO_BLOCKS)
     )
