@@ -11,7 +11,7 @@ Read the package in this order. A module imports only from its own entry of the 
 7. `motion_measures`  measures that several engines have: loops, energy balance, reversals
 8. `effects`      physical effects and methods that a scene can request
 9. `disk`         atomic writes, locks and the user's cache
-10. `compiled`     machine code of the kernels and its cache
+10. `kernel_cache` machine code of the kernels and its cache
 11. `closed_forms` exact solutions of contact at rounded edges
 12. `scene`        parsing and validation of a TOML file, with values in SI units
 13. `inputs`       measured data files: columns, slide paths, signals, loops
@@ -20,13 +20,13 @@ Read the package in this order. A module imports only from its own entry of the 
 16. `elasticity`   static condensation of the pieces to their interface, and stress recovery
 17. `contact`      gap shapes, unilateral contact, asperity layers, cells of a face
 18. `friction`     friction laws and the sum over bonds along the path
-19. `slip`         partial slip of the pieces: elements, shear modes, tangents
+19. `partial_slip` partial slip of the pieces: elements, shear modes, tangents
 20. `structure`    modes and drive of the rig
-21. `hybrid`       motion from event to event by steps of order 8
+21. `event_driven` motion from event to event by steps of order 8
 22. `points`       sweeps over many cases of one mode and one contact point
 23. `time_steps`   steps of order 2 of contact points under every law with every effect
 24. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
-25. `response`     measures of a run: outcome, events, levels and free vibration
+25. `measures`     measures of a run: outcome, events, levels and free vibration
 26. `wear`         wear depth over many cycles
 27. `runs`         patch, bench and rig: static contact, friction and dynamics combined
 28. `identify`     parameters from measurements, with confidence intervals

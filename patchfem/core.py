@@ -52,8 +52,6 @@ __all__ = [
 
 G_N = 9.80665  # standard gravity [m s-2]
 MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness of a friction law refers
-# relative round-off of squared frequencies, allowed for in the rule that a spring lowers no frequency
-_STIFFENING_ROUND_OFF = 1e-9
 # lower limit of the overlap of two mode shapes, which keeps its logarithm finite
 _ZERO_OVERLAP = 1e-30
 # assignment cost of a forbidden pair of modes, larger than that of any allowed assignment
@@ -272,7 +270,9 @@ class ModalBasis:
         values, vectors = np.linalg.eigh(
             np.diag(self.omega**2) + rows.T * stiffness @ rows / self.mass
         )
-        lower = (1 - _STIFFENING_ROUND_OFF) * self.omega**2
+        # Relative round-off of squared frequencies, allowed for in the rule that a spring lowers no
+        # frequency
+        lower = (1 - 1e-9) * self.omega**2
         k = _assign_modes(lower, values, np.abs(vectors))[number]
         omega = float(np.sqrt(max(values[k], 0.0)))
         return StuckMode(omega, vectors[:, k] / vectors[number, k])
@@ -372,7 +372,7 @@ class Measure:
     - reason: reason why the value or its error is None.
     - engine: method that computed the value; "" for the engine of the run.
     - parts: contribution to the error of each discretisation, such as "steps" or "mesh", from coarser runs
-      (`response.errors`); None if they are unknown.
+      (`measures.errors`); None if they are unknown.
     """
 
     value: float | None
@@ -433,7 +433,7 @@ class MeasureDefinition(NamedTuple):
     - sample_error: error due to sampling, multiplied by the number of samples per cycle.
     - group: group of related measures: motion, friction, energy, patch or wear.
     - larger_term: for a measure that is a small difference of larger terms, the name of these terms; otherwise "". The
-      tolerance times their size (`response.rows.find_larger_term`) is added to the floor.
+      tolerance times their size (`measures.rows.find_larger_term`) is added to the floor.
     - order: order of the sampling error of an exact motion in the sample spacing.
     - minimum: smallest possible value.
     - flags: sets to which the measure belongs, separated by blanks: "main" (the tolerance of a run applies to it),
@@ -443,7 +443,7 @@ class MeasureDefinition(NamedTuple):
       under a sine), "cycle" (a mean over whole cycles of a sine),
       "loop" (an integral or a peak of samples of the friction loop), "run" (a sum over the whole run),
       "phase" (an angle modulo pi), "scatter" (a statistical mean under a random drive).
-    - friction_scale: name of the size in `response.errors.compute_friction_errors` that is the error of the measure for a
+    - friction_scale: name of the size in `measures.errors.compute_friction_errors` that is the error of the measure for a
       relative error 1 of the friction force; "" if this is the value of the measure.
     """
 

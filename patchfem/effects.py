@@ -11,7 +11,7 @@ load. Optional features are:
 - `shear`: elastic pieces ([contact.shear]);
 - `exact`: steady motions of the whole interface as one rigid element;
 - `pieces`: elements that stick or slip, for patches that slip part by part;
-- `harmonic`: motions from event to event, and steady motions over one period, by a module of `hybrid.laws`;
+- `harmonic`: motions from event to event, and steady motions over one period, by a module of `event_driven.laws`;
 - `march`: time steps (`time_steps.laws`).
 
 Traits of laws:
@@ -24,7 +24,7 @@ Traits of laws:
 - `creeps`: the interface never sticks;
 - `cells`: a continuous distribution of elements is discretised into cells.
 
-`hybrid.laws` and `time_steps.laws` have their own lists of supported laws.
+`event_driven.laws` and `time_steps.laws` have their own lists of supported laws.
 
 A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
 `DRIVE_BUILDERS` of its module.

@@ -18,7 +18,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import HealthCheck, settings
 
-from patchfem.compiled import UNCACHED_FUNCTIONS, find_cache_folder
+from patchfem.kernel_cache import UNCACHED_FUNCTIONS, find_cache_folder
 
 HERE = Path(__file__).parent
 

@@ -33,7 +33,7 @@ from import_graph import child_nodes, syntax_nodes  # noqa: E402
 BASELINE = "tests/house.toml"
 TREES = ("patchfem", "studies", "tests")
 # Modules with the functions of measures.toml; every other module of the package asks them.
-MEASURE_TABLES = ("patchfem/response/rows.py", "patchfem/runs/results/patch_rows.py")
+MEASURE_TABLES = ("patchfem/measures/rows.py", "patchfem/runs/results/patch_rows.py")
 SHOWN_LINES = 12  # largest number of lines that a message lists
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 CALLABLES = (*FUNCTIONS, ast.Lambda)
@@ -318,7 +318,7 @@ def style_rules(source: Source):
 
 
 def measure_names(root: Path) -> frozenset:
-    """Return the names of all measures of measures.toml, except those that are constants of response/rows.py."""
+    """Return the names of all measures of measures.toml, except those that are constants of measures/rows.py."""
     path = root / "patchfem/measures.toml"
     if not path.is_file():
         return frozenset()

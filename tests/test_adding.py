@@ -162,13 +162,13 @@ def test_sweep_of_added_law_agrees_with_single_run(marched_folder):
 def test_always_law_of_page_agrees_in_two_engines(law_folder):
     """Compiled event engine and harmonic balance give the same loop of the added law within their error estimates."""
     adding.run_commands(law_folder, [line for line in adding.find_commands(PAGE) if "dahl" in line])
-    hybrid = read_measures(law_folder / "rig_dahl")
+    event_driven = read_measures(law_folder / "rig_dahl")
     found = read_measures(law_folder / "harmonic")
-    assert_loop_matches_closed_form(hybrid)
+    assert_loop_matches_closed_form(event_driven)
     assert_loop_matches_closed_form(found)
     for name in ("relative_displacement_amplitude", "loop_area", "friction_force_peak"):
         one = found[name]
-        other = hybrid[name]
+        other = event_driven[name]
         assert abs(one["value"] - other["value"]) <= one["error"] + other["error"], name
 
 
@@ -242,8 +242,8 @@ def test_always_added_measures_agree_with_histories(example_folder, law_folder):
     slide = late.relative_displacement.values
     assert found["slide_range"]["value"] == pytest.approx(np.ptp(slide), rel=1e-9)
     assert 0 <= found["slide_range"]["error"] < 1e-3 * found["slide_range"]["value"]
-    hybrid = read_measures(law_folder / "dahl")["slide_range"]
-    assert 0 < hybrid["error"] < 1e-3 * hybrid["value"]
+    event_driven = read_measures(law_folder / "dahl")["slide_range"]
+    assert 0 < event_driven["error"] < 1e-3 * event_driven["value"]
     rms = found["friction_force_rms"]
     steady = np.sqrt(
         np.trapezoid(late.friction_force.values**2, late.time.values) / np.ptp(late.time.values)

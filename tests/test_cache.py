@@ -17,16 +17,16 @@ import pytest
 from scene_texts import PLASTIC, POINT, TRIANGLE
 
 import patchfem
-from patchfem import compiled
-from patchfem.compiled import portable
+from patchfem import kernel_cache
 from patchfem.disk import user_cache
+from patchfem.kernel_cache import portable
 
 # A prescribed slide has the smallest time loop that contains a friction law; an oscillating load needs this loop.
 SCENE = POINT + 'amplitude = "1 N"\nfrequency = "50 Hz"\n' + PLASTIC + TRIANGLE
 BENCH = """\
 import gc, json, lzma, sys
 import patchfem.runs.run as simulate
-from patchfem.compiled import KernelFunction
+from patchfem.kernel_cache import KernelFunction
 from patchfem.scene.scene import loads
 said = []
 result = simulate.run(simulate.plan(loads(sys.argv[1])), say=said.append, estimate=False)
@@ -37,10 +37,10 @@ print(json.dumps({"work": result.measures["loop_area"].value,
                   "stored": [one.name for one in kernels if all(one.loaded_functions.values())],
                   "not stored": [one.name for one in kernels if not all(one.loaded_functions.values())]}))
 if len(sys.argv) > 2:
-    from patchfem import compiled
-    from patchfem.compiled import machine
+    from patchfem import kernel_cache
+    from patchfem.kernel_cache import machine
     from portable_code import pack_portable_codes
-    kernels = compiled.hash_kernels()
+    kernels = kernel_cache.hash_kernels()
     packed = pack_portable_codes(machine.PORTABLE_CODES, kernels, "of this process")
     with open(sys.argv[2], "wb") as file:
         file.write(lzma.compress(packed))
@@ -143,7 +143,7 @@ def test_exact_portable_code_needs_no_numba(tmp_path, shared_cache, parallel_res
     """
     home = copy_package(tmp_path)
     largest = max(shared_cache.glob("*.xz"), key=lambda path: path.stat().st_size)
-    kept = home / "patchfem/compiled/portable.xz"
+    kept = home / "patchfem/kernel_cache/portable.xz"
     shutil.copy(largest, kept)
     first = run_slide(home, tmp_path / "first")
     assert not first["numba"] and not first["said"]
@@ -157,7 +157,7 @@ def test_exact_portable_code_needs_no_numba(tmp_path, shared_cache, parallel_res
 )
 def test_exact_unfit_portable_code_is_ignored(tmp_path, monkeypatch, harm):
     """Portable code that is damaged or made for other kernels, and any if indices are checked, is ignored."""
-    kernels = "of others" if harm == "other kernels" else compiled.hash_kernels()
+    kernels = "of others" if harm == "other kernels" else kernel_cache.hash_kernels()
     content = portable_code.pack_portable_codes({"b": b"second", "a": b"first"}, kernels, "any")
     data = bytearray(lzma.compress(b"[]\n" if harm == "no header" else content))
     changed = data.copy()
@@ -167,7 +167,7 @@ def test_exact_unfit_portable_code_is_ignored(tmp_path, monkeypatch, harm):
     monkeypatch.setattr(portable, "PORTABLE_PATH", path if harm != "gone" else tmp_path / "none.xz")
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", str(int(harm == "index checks")))
     portable.read_portable_codes.cache_clear()
-    found = compiled.list_portable_codes()
+    found = kernel_cache.list_portable_codes()
     portable.read_portable_codes.cache_clear()
     assert found == ({} if harm else {"a": b"first", "b": b"second"})
 
@@ -190,18 +190,18 @@ def test_exact_portable_code_of_package_can_be_made_again(tmp_path):
 
 KEYS = """\
 import json, pathlib
-from patchfem import compiled
-package = pathlib.Path(compiled.__file__).parents[1]
+from patchfem import kernel_cache
+package = pathlib.Path(kernel_cache.__file__).parents[1]
 kernels = sorted(package.rglob("*kernels.py"))
-keys = [compiled.compute_kernel_key()]
+keys = [kernel_cache.compute_kernel_key()]
 with open(package / "core.py", "a", encoding="utf-8") as file:
     file.write("# edited")
-keys.append(compiled.compute_kernel_key())
-for path in (*kernels, *(package / name for name in compiled.TUPLE_MODULES)):
+keys.append(kernel_cache.compute_kernel_key())
+for path in (*kernels, *(package / name for name in kernel_cache.TUPLE_MODULES)):
     path.write_text(path.read_text("utf-8") + "# edited\\n", "utf-8")
-    keys.append(compiled.compute_kernel_key())
+    keys.append(kernel_cache.compute_kernel_key())
 (package / "mesh/new_kernels.py").write_text("", "utf-8")
-keys.append(compiled.compute_kernel_key())
+keys.append(kernel_cache.compute_kernel_key())
 print(json.dumps(keys))
 """
 
@@ -226,9 +226,9 @@ def test_exact_cache_key_depends_on_kernels(tmp_path):
         return json.loads(done.stdout)
 
     own, after_core, *others = compute_keys()
-    assert own == after_core == compiled.compute_kernel_key()
+    assert own == after_core == kernel_cache.compute_kernel_key()
     n_kernels = len(list((home / "patchfem").rglob("*kernels.py")))
-    assert len(others) == n_kernels + len(compiled.TUPLE_MODULES) > 30
+    assert len(others) == n_kernels + len(kernel_cache.TUPLE_MODULES) > 30
     assert len({own, *others}) == 1 + len(others)
     metadata = home / "numba-0.0.dist-info/METADATA"
     metadata.parent.mkdir()
@@ -240,14 +240,14 @@ def test_exact_cache_folder_follows_environment(tmp_path, monkeypatch):
     """The cache folder lies in PATCHFEM_CACHE, else in XDG_CACHE_HOME, else in ~/.cache."""
     monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "mine"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "theirs"))
-    folder = compiled.find_cache_folder().path
-    assert folder == tmp_path / "mine/patchfem" / compiled.compute_kernel_key()
+    folder = kernel_cache.find_cache_folder().path
+    assert folder == tmp_path / "mine/patchfem" / kernel_cache.compute_kernel_key()
     assert folder.is_dir() and not list(folder.iterdir())
     monkeypatch.delenv("PATCHFEM_CACHE")
-    assert compiled.find_cache_folder().path.is_relative_to(tmp_path / "theirs")
+    assert kernel_cache.find_cache_folder().path.is_relative_to(tmp_path / "theirs")
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert compiled.find_cache_folder().path.is_relative_to(tmp_path / "home/.cache")
+    assert kernel_cache.find_cache_folder().path.is_relative_to(tmp_path / "home/.cache")
 
 
 @pytest.mark.parametrize(
@@ -285,18 +285,18 @@ def test_exact_untrusted_cache_folder_is_avoided(tmp_path, monkeypatch, obstacle
     monkeypatch.setenv("PATCHFEM_CACHE", str(base))
     user_cache.make_process_folder.cache_clear()
     try:
-        first = compiled.find_cache_folder().path
+        first = kernel_cache.find_cache_folder().path
         assert first.is_relative_to(temporary)
         assert first.is_dir()
-        assert str(base) in compiled.find_cache_folder().problem
+        assert str(base) in kernel_cache.find_cache_folder().problem
         assert not (temporary / "patchfem").exists()
         assert os.stat(user_cache.make_process_folder()).st_mode & 0o77 == 0
-        assert compiled.find_cache_folder().path == first  # the same in one process
+        assert kernel_cache.find_cache_folder().path == first  # the same in one process
         user_cache.make_process_folder.cache_clear()
-        assert compiled.find_cache_folder().path != first  # another in the next
+        assert kernel_cache.find_cache_folder().path != first  # another in the next
         shutil.rmtree(temporary)
         user_cache.make_process_folder.cache_clear()
-        assert not compiled.find_cache_folder().path.exists()  # nothing is kept, nothing fails
+        assert not kernel_cache.find_cache_folder().path.exists()  # nothing is kept, nothing fails
     finally:
         user_cache.make_process_folder.cache_clear()
 
@@ -304,13 +304,17 @@ def test_exact_untrusted_cache_folder_is_avoided(tmp_path, monkeypatch, obstacle
 def test_exact_instance_of_kernels_replaces_import():
     """A module in which another one replaces an import calls the functions of the other one, and has no file of its own."""
     text = "SHIFT = 3\n\n\ndef shift(x):\n    return SHIFT + x\n"
-    part = compiled.make_kernel_module("compiled.shifting", text, Path("shifting.py"))
+    part = kernel_cache.make_kernel_module("kernel_cache.shifting", text, Path("shifting.py"))
     whole = f"import {part.__name__} as part\n\n\ndef double(x):\n    return 2 * part.shift(x)\n"
-    found = compiled.make_kernel_module("compiled.doubling", whole, Path("doubling.py"), [part])
+    found = kernel_cache.make_kernel_module(
+        "kernel_cache.doubling", whole, Path("doubling.py"), [part]
+    )
     assert found.double(1) == 8 and part.SHIFT == 3
     assert found.load_module().double.__code__.co_filename == "doubling.py"
     with pytest.raises(ValueError, match="imports its part nothing 0 times"):
-        compiled.instantiate("time_steps.march_kernels", {"nothing": "time_steps.no_lists_kernels"})
+        kernel_cache.instantiate(
+            "time_steps.march_kernels", {"nothing": "time_steps.no_lists_kernels"}
+        )
     for name in (part.__name__, found.__name__):
         sys.modules.pop(name)
 
@@ -318,6 +322,6 @@ def test_exact_instance_of_kernels_replaces_import():
 def test_always_instance_of_kernels_is_kept():
     """Runs with the same parts share one kernel module: a module of its own would keep 1 MB in each run of a sweep."""
     parts = {"lists": "time_steps.no_lists_kernels"}
-    first = compiled.instantiate("time_steps.march_kernels", parts)
-    assert compiled.instantiate("time_steps.march_kernels", parts) is first
-    assert compiled.instantiate("time_steps.march_kernels", {}) is not first
+    first = kernel_cache.instantiate("time_steps.march_kernels", parts)
+    assert kernel_cache.instantiate("time_steps.march_kernels", parts) is first
+    assert kernel_cache.instantiate("time_steps.march_kernels", {}) is not first

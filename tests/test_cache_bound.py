@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 from time import time
 
-from patchfem import compiled
+from patchfem import kernel_cache
 
 HOUR = 3600.0
 
@@ -30,13 +30,13 @@ def make_current_folder(base: Path) -> Path:
 
 def test_exact_unused_folders_are_removed(tmp_path):
     """A new folder removes those that were unused for longer than the limit; a folder in use is marked."""
-    days = compiled.MAX_UNUSED_SECONDS / HOUR
+    days = kernel_cache.MAX_UNUSED_SECONDS / HOUR
     folders = make_code_folders(tmp_path, [days + 1, days - 1, 0.0, 9 * days])
-    compiled.remove_old_folders(folders[1])  # it contains code
+    kernel_cache.remove_old_folders(folders[1])  # it contains code
     assert all(folder.exists() for folder in folders)
     assert time() - folders[1].stat().st_mtime < 60
     current = make_current_folder(tmp_path)
-    compiled.remove_old_folders(current)
+    kernel_cache.remove_old_folders(current)
     assert [folder.exists() for folder in folders] == [False, True, True, False]
     assert current.is_dir()
 
@@ -52,5 +52,5 @@ def test_exact_other_files_are_not_removed(tmp_path):
     (tmp_path / ("2" * 16)).symlink_to(target)
     for path in tmp_path.iterdir():
         os.utime(path, (time() - 9999 * HOUR,) * 2, follow_symlinks=False)
-    compiled.remove_old_folders(current)
+    kernel_cache.remove_old_folders(current)
     assert target.is_dir() and len(list(tmp_path.iterdir())) == 7

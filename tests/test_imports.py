@@ -37,13 +37,13 @@ def write_scene(tmp_path):
 
 
 PHYSICS = set(
-    "closed_forms compiled contact elasticity friction hybrid identify inputs mesh points response slip structure surface "
-    "time_steps wear".split()
+    "closed_forms kernel_cache contact elasticity friction event_driven identify inputs mesh points measures partial_slip "
+    "structure surface time_steps wear".split()
 )
 PIECES = "contact elasticity mesh "  # folders needed to solve a static patch
-MOTION = "compiled hybrid response structure "  # folders needed to integrate the motion of a rig
+MOTION = "kernel_cache event_driven measures structure "  # folders needed to integrate the motion of a rig
 SLIDING = MOTION + "friction "  # the same with friction
-BENCH_FOLDERS = "friction response "  # folders needed to follow a prescribed slide
+BENCH_FOLDERS = "friction measures "  # folders needed to follow a prescribed slide
 WEAR = '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
 FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run` loads for the run and its page
     "static patch": (PATCH, PIECES),
@@ -55,7 +55,7 @@ FOLDERS = {  # kind of scene -> text, folders of the physics that `patchfem run`
     "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + SLIDING),
     "rig of a patch with slip": (
         COATED + SHEAR + PLASTIC + STRUCTURE,
-        PIECES + SLIDING + "slip",
+        PIECES + SLIDING + "partial_slip",
     ),
     "wear": (COATED + COULOMB + TRIANGLE + WEAR, PIECES + BENCH_FOLDERS + "time_steps wear"),
 }
@@ -75,13 +75,13 @@ def test_exact_run_loads_folders_of_its_scene(write_scene, tmp_path, kind):
 
 
 PATCH_KEYS = "elasticity.mortar surface"
-RIG_KEYS = {"structure.bonded", "hybrid.periodic"}
+RIG_KEYS = {"structure.bonded", "event_driven.periodic"}
 MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are loaded, modules that are not
     "patch": (
         PATCH,
         "contact.press contact.unilateral mesh.grid",
-        "compiled contact.asperity_laws contact.bounded elasticity.mortar "
-        "elasticity.recovery export mesh.pieces mesh.checks response scipy skfem",
+        "kernel_cache contact.asperity_laws contact.bounded elasticity.mortar "
+        "elasticity.recovery export mesh.pieces mesh.checks measures scipy skfem",
     ),
     "skin": (
         PATCH + '[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n',
@@ -90,21 +90,21 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
     ),
     "linear rig": (
         STRUCTURE,
-        "hybrid.runs",
-        "hybrid.stored_energy hybrid.laws.grooves hybrid.laws.masing hybrid.laws.springs",
+        "event_driven.runs",
+        "event_driven.stored_energy event_driven.laws.grooves event_driven.laws.masing event_driven.laws.springs",
     ),
     "point on a rig": (
         COULOMB_RIG,
-        "hybrid.runs structure.modes",
+        "event_driven.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.drives "
-        "hybrid.free_motions hybrid.periodic_curves "
+        "event_driven.free_motions event_driven.periodic_curves "
         "time_steps runs.rig.steady " + " ".join(RIG_KEYS),
     ),
     **{
         name: (COULOMB_RIG + lines, module, " ".join(RIG_KEYS - {module}))
         for name, lines, module in (
             ("bonded spring", '[structure.bonded]\nstiffness = "1e6 N/m"\n', "structure.bonded"),
-            ("harmonic", '[accuracy]\nmethod = "harmonic"\n', "hybrid.periodic"),
+            ("harmonic", '[accuracy]\nmethod = "harmonic"\n', "event_driven.periodic"),
         )
     },
     "bench": (BENCH, "runs.bench.bench", "campaigns export.sweeps scene.assignments runs.batch"),
@@ -150,7 +150,7 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
     ),
     "check": (rig_without_files(), ("check", "SCENE"), "", HEAVY),
     "check of measured rows": ("", ("check", str(RIG)), "", HEAVY),
-    "help": ("", ("--help",), "scene.lines", HEAVY + " pydantic"),
+    "help": ("", ("--help",), "scene.keys.lines", HEAVY + " pydantic"),
     "sweep": (
         BENCH,
         ("sweep", "SCENE", "--over", "friction.static=0.1,0.2", "-o", "OUT", "-q"),

@@ -41,13 +41,27 @@ SCENE_ALSO = (
     "campaigns.rows.condition_models",
 )
 OUTSIDE = {
-    "numba": ("*kernels", "compiled", "compiled.*"),
+    "numba": ("*kernels", "kernel_cache", "kernel_cache.*"),
     "pyvista": ("export.convert", "export.fields.grids"),
     "meshio": ("mesh.files", "export.*"),
 }
 # folders of the physics in their reading order
-PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "hybrid", "runs"]
-ORDERED = ("dynamics", "hybrid", "runs", "export")  # folders with a reading order of their own
+PHYSICS = [
+    "core",
+    "mesh",
+    "surface",
+    "elasticity",
+    "contact",
+    "partial_slip",
+    "event_driven",
+    "runs",
+]
+ORDERED = (
+    "dynamics",
+    "event_driven",
+    "runs",
+    "export",
+)  # folders with a reading order of their own
 FUNCTION_LINES = 120  # the longest functions are commands with one line per option
 # syntax nodes that can name an object
 KNOWING = (ast.Name, ast.Attribute, ast.alias, ast.ClassDef, ast.arg, ast.AnnAssign, *FUNCTIONS)

@@ -12,7 +12,7 @@ import pytest
 from scene_texts import PLASTIC, POINT, STRUCTURE
 
 import patchfem as pf
-from patchfem.compiled import jit, machine
+from patchfem.kernel_cache import jit, machine
 
 
 class Inner(NamedTuple):

@@ -5,7 +5,7 @@ import sys
 from shutil import which
 from typing import NamedTuple
 
-from .. import __version__, compiled
+from .. import __version__, kernel_cache
 from ..disk.installed import find_package_version
 
 # Packages that pyproject.toml requires; an older installation may lack new ones.
@@ -83,7 +83,7 @@ def _check_package(name: str, label: str, source: str, remark: str) -> Finding:
 
 def _check_cache() -> Finding:
     """Check the cache of compiled code, without which every command would compile again."""
-    folder, reason = compiled.find_cache_folder()
+    folder, reason = kernel_cache.find_cache_folder()
     sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
     text = f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}"
     cure = reason and f"{reason}; set PATCHFEM_CACHE to another folder"

@@ -14,8 +14,8 @@ set.
 
 from typing import NamedTuple
 
-from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ..kernel_cache.jit import njit
 from .set_arrays import (
     MAX_OPENING_INDEX,
     OLDEST_SLOT_INDEX,

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_NO_REFCOUNT
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_NO_REFCOUNT
+from ..kernel_cache.jit import njit
 from .press_kernels import (
     FASTMATH_MINIMUM_SEARCH_FLAGS,
     ContactBounds,

@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .. import inputs, response, structure
+from .. import inputs, structure
+from .. import measures as run_measures
 from ..core import PatchfemError, SineDrive
 from ..model import structure as structure_model
 from ..runs.findings import compute_accuracy_curve
@@ -66,7 +67,7 @@ def _read_row(result: Result, name: str, row: Row) -> Variables:
     if values is None or not np.size(values):
         return {}
     if name == "event_kind":
-        row = row._replace(meanings=response.events.EVENT_KIND_NAMES)
+        row = row._replace(meanings=run_measures.events.EVENT_KIND_NAMES)
     if row.unit == "" and not row.meanings:
         values = np.array([str(value) for value in values])
     return {name: make_column(name, values, row)}
@@ -257,8 +258,8 @@ def _collect_levels(result: Result) -> Variables:
     data |= make_variables("run", level_stuck=[level.stuck for level in levels])
 
     measures = {}
-    table = response.rows.MOTION_TABLE
-    for name in response.events.LEVEL_MEASURES:
+    table = run_measures.rows.MOTION_TABLE
+    for name in run_measures.events.LEVEL_MEASURES:
         if any(name in level.values for level in levels):
             unit = table[name].unit
             values = [level.values.get(name, np.nan) for level in levels]
@@ -347,7 +348,9 @@ def find_readings(result: Result) -> tuple[list[inputs.measured.MeasuredRow], Qu
     peak = measures["acceleration"]
     signal = model.rig.drive.signal
     if kind != "peak" and isinstance(signal, SineDrive) and peak is not None and peak.value:
-        reading = response.spectrum.read_instrument(result.window, signal, peak.value, kind, cutoff)
+        reading = run_measures.spectrum.read_instrument(
+            result.window, signal, peak.value, kind, cutoff
+        )
         factors["acceleration"] *= reading / peak.value
 
     computed = {}

@@ -2,8 +2,9 @@
 
 In: keys of a table [friction] and a load. Out: the law of a contact in the form that the engines take (`protocol`).
 `laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named *kernels are compiled
-for `time_steps` and `points`; the engine `hybrid` has its own files of the laws. `grooves` has matched grooves, whose flanks
-the load climbs. `path_work` computes the friction work of samples. Read `protocol` first, then `laws/elastic_plastic`.
+for `time_steps` and `points`; the engine `event_driven` has its own files of the laws. `grooves` has matched grooves, whose
+flanks the load climbs. `path_work` computes the friction work of samples. Read `protocol` first, then
+`laws/elastic_plastic`.
 """
 
 # Names that other folders use, by module

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import compiled
+from .. import kernel_cache
 from ..core import ModalBasis, SineDrive
 from ..motion_measures import (
     Observations,
@@ -109,7 +109,7 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     memory = np.zeros((n, Masing.STACK + 2 * REVERSALS if is_masing else len(Memory)))
     if is_masing:
         memory[:, Masing.VIRGIN] = 1.0
-    kernels = compiled.load_compiled_module("points.march_kernels")
+    kernels = kernel_cache.load_compiled_module("points.march_kernels")
     kernels.march_cases(steps, cases.parameters, PointLaw(cases.numbers, memory), record)
 
     output = columns[Number.OUTPUT][:, None]

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
-from ..compiled.jit import njit
 from ..friction.bonds.point_kernels import shape_functions
 from ..friction.laws.bouc_wen_kernels import follow_path
 from ..friction.laws.lugre_kernels import LuGreNumber, relaxation_length
 from ..friction.laws.lugre_kernels import find_force as find_bristle_force
+from ..kernel_cache.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from ..kernel_cache.jit import njit
 from .rows import Law, LawNumber, Masing, Memory
 
 CORNER_TOLERANCE = 1e-5  # smallest path to a corner relative to that of its branch

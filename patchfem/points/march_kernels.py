@@ -5,8 +5,8 @@ A motion that repeats is not computed again up to its last cycles.
 
 from math import inf, nan, pi
 
-from ..compiled.flags_kernels import NJIT_KERNEL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_KERNEL
+from ..kernel_cache.jit import njit
 from .law_kernels import find_first_tangent
 from .motion_kernels import (
     Instant,

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
-from ..compiled.jit import njit
 from ..friction.laws.lugre_kernels import LuGreNumber
+from ..kernel_cache.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from ..kernel_cache.jit import njit
 from .law_kernels import (
     Branch,
     Step,

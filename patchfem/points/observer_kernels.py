@@ -10,8 +10,8 @@ the velocity changes its sign, or where the acceleration jumps. What lies betwee
 from math import nan
 from typing import NamedTuple
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from ..kernel_cache.jit import njit
 from .law_kernels import find_share
 from .motion_kernels import Goal, find_rest, is_linear, locate, rotate, sample
 from .rows import Energy, Law, LawNumber, Loop, Number, Seen

@@ -13,7 +13,7 @@ from dataclasses import replace
 from math import ceil, floor, inf, log2, log10
 from typing import NamedTuple
 
-from .. import response
+from .. import measures as run_measures
 from ..convergence import MAX_CONVERGENCE_ORDER
 from ..core import Measure, Outcome
 from ..formatting import format_number
@@ -36,8 +36,6 @@ MAX_FIXED_STEP_HALVINGS = 4
 USE_ERROR_ADVICE = "use the value with its stated error"
 ELEMENT_SIZE_KEY = "contact.element_size"
 STEPS_PER_CYCLE_KEY = "accuracy.steps_per_cycle"
-# Ratio of a proposed limit to the expected CPU time, which varies by tens of per cent, or to the expected memory.
-LIMIT_MARGIN = 2.0
 
 
 class Missed(NamedTuple):
@@ -238,7 +236,9 @@ def _advise_limit(missed: Missed, purpose: str, cause: str = "") -> Advice:
     """
     # The proposed limit has two significant digits.
     shortage = missed.result.shortage
-    needed = LIMIT_MARGIN * shortage.needed
+    # Ratio of a proposed limit to the expected CPU time, which varies by tens of per cent, or to
+    # the expected memory.
+    needed = 2.0 * shortage.needed
     unit = 10.0 ** (floor(log10(needed)) - 1)
     limit = unit * ceil(needed / unit)
     value = format_number(limit, 2)
@@ -261,7 +261,7 @@ def _advise_on_motion(missed: Missed) -> Advice:
     advice = None if advise is None else advise(missed)
     if advice is not None:
         return advice._replace(axis=axis)
-    if name == response.rows.STEADY_AMPLITUDE:  # In a longer run the transient decays further.
+    if name == run_measures.rows.STEADY_AMPLITUDE:  # In a longer run the transient decays further.
         text = "more drive cycles make this value more accurate; raise drive.cycles"
         return Advice(text, "drive.cycles")
     return Advice(USE_ERROR_ADVICE)
@@ -282,7 +282,7 @@ def _advise_steps(missed: Missed) -> Advice | None:
     # A rig doubles its steps while this reduces the errors, or needs none from event to event, unless the scene fixes them.
     model = missed.model
     fixed = ["method"] * (
-        model.accuracy.method != "auto" and not engines.HYBRID.find_unsupported_feature(model)
+        model.accuracy.method != "auto" and not engines.EVENT_DRIVEN.find_unsupported_feature(model)
     )
     if model.accuracy.steps_per_cycle is not None:
         fixed.append("steps_per_cycle")
@@ -371,7 +371,7 @@ def mark_unbalanced(result: Result) -> Result:
     return replace(
         result,
         outcome=Outcome.NOT_CONVERGED,
-        measures=response.outcome.remove_errors(result.measures),
+        measures=run_measures.outcome.remove_errors(result.measures),
         warnings=[*warnings, *result.warnings],
     )
 
@@ -419,10 +419,6 @@ def _check_energy(result: Result) -> Iterator[str]:
 
 
 # ---- accuracy against computing time
-
-LONG_SUM_ROUND_OFF = 1e-9  # largest relative error that counts as round-off in long sums
-# Smallest ratio of the errors with finer and coarser steps at which the steps do not matter
-INEFFECTIVE_STEPS_ERROR_RATIO = 0.9
 
 
 class StepSetting(NamedTuple):
@@ -479,12 +475,14 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
     present = settings[0].error
     distances = errors
     for run in coarser_runs:
-        change = response.errors.compute_absolute_changes(present_run.values, run.values)
+        change = run_measures.errors.compute_absolute_changes(present_run.values, run.values)
         # A coarse run that is accurate by chance gets the error of the finer one.
         distances = {name: max(change[name] + errors[name], distances[name]) for name in measures}
         settings.insert(0, make_setting(run.steps, distances))
-    has_effect = settings[0].error * INEFFECTIVE_STEPS_ERROR_RATIO >= present
-    return settings if has_effect and present >= LONG_SUM_ROUND_OFF else []
+    # Smallest ratio of the errors with finer and coarser steps at which the steps do not matter
+    has_effect = settings[0].error * 0.9 >= present
+    # Largest relative error that counts as round-off in long sums
+    return settings if has_effect and present >= 1e-9 else []
 
 
 def _select_measures(measures: Measures, step_runs) -> Measures:
@@ -493,7 +491,7 @@ def _select_measures(measures: Measures, step_runs) -> Measures:
     for name, measure in measures.items():
         is_known = None not in (measure.value, measure.error)
         is_in_all_runs = all(name in run.values for run in step_runs)
-        if is_known and is_in_all_runs and name not in response.errors.ERROR_MEASURES:
+        if is_known and is_in_all_runs and name not in run_measures.errors.ERROR_MEASURES:
             common[name] = measure
     main = {name: measure for name, measure in common.items() if is_main(name)}
     return main or common

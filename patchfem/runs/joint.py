@@ -22,7 +22,7 @@ from ..friction import record
 from ..model.model import Model
 from ..model.source import Source, locate_errors
 from ..model.structure import compute_sticking_stiffness
-from ..slip.edge_springs import add_edge_springs
+from ..partial_slip.edge_springs import add_edge_springs
 from .patch import faces, mesh_levels
 from .patch.jenkins_elements import compute_stick_stiffness
 from .patch.press import Patch, Patches

@@ -8,7 +8,8 @@ the memory of the run (`list_memory_parts`), and refuses a run that needs more t
 import mmap
 from collections.abc import Callable
 from contextlib import suppress
-from math import inf
+from dataclasses import replace
+from math import inf, prod
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from ..effects import EFFECTS, law_has_trait
 from ..model.model import Model, build
 from ..model.source import locate_errors, name_key
 from ..scene import refuse_attribute
+from ..scene.overrides import BaseScene
 from . import joint, refine
 from .bench import engine as of_bench
 from .interfaces import bond_lists
@@ -131,7 +133,7 @@ class Plan:
 
 
 def plan(source) -> Plan:
-    """Plan the run of a Scene or a Model.
+    """Plan the run of a Scene or a Model, or the first case of a Scene with a table [sweep].
 
     Parameters
     ----------
@@ -143,9 +145,18 @@ def plan(source) -> Plan:
     PatchfemError
         If the scene cannot be run, with the position of the error in the scene.
     """
-    model = source if isinstance(source, Model) else build(source)
-    with locate_errors(model.source):
-        return _make_plan(model)
+    if isinstance(source, Model):
+        with locate_errors(source.source):
+            return _make_plan(source)
+    if not source.sweep:
+        return plan(build(source))
+
+    # A key that only [sweep] names has its first value in each scene of the file; others get theirs.
+    first = [f"{axis.key}={axis.texts[0]}" for axis in source.sweep]
+    count = prod(len(axis.texts) for axis in source.sweep)
+    case = plan(build(BaseScene(source).override(first)))
+    sentence = f"this is the first of {count} cases of [sweep], {', '.join(first)}; `--set` of its keys chooses another one"
+    return replace(case, verdict=(sentence, *case.verdict))
 
 
 def _make_plan(model: Model) -> Plan:
@@ -263,7 +274,9 @@ BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide
 # Bytes per entry of an n x n array of n modes, of which there are matrices, mode shapes and those of the eigenvalue solver
 BYTES_PER_MODE_PAIR = 125.0
 BYTES_PER_DRIVE_ROW = 400.0  # per row of a recorded drive
-HYBRID_SAMPLES_PER_STORED_CYCLE = 400  # samples that the engine `hybrid` stores of a cycle
+EVENT_DRIVEN_SAMPLES_PER_STORED_CYCLE = (
+    400  # samples that the engine `event_driven` stores of a cycle
+)
 # Expected reversals per cycle, which are stored also for the cycles before the window
 REVERSALS_PER_CYCLE = 4.0
 
@@ -297,7 +310,7 @@ class HistoryBytes(NamedTuple):
 
 # Memory of the histories by engine
 HISTORY_BYTES = {
-    "hybrid": HistoryBytes(80.0, 140.0, 16.0),
+    "event_driven": HistoryBytes(80.0, 140.0, 16.0),
     "march": HistoryBytes(45.0, 50.0, 18.0),
 }
 
@@ -351,7 +364,7 @@ def _list_memory_parts_of_motion(plan: Plan, steps_key: str) -> list[MemoryPart]
     # Histories: all samples of the last cycles, and reversals and extremes of the cycles before.
     settings = engines.choose_numerics(plan.model)
     history = HISTORY_BYTES[plan.engine]
-    steps = settings.steps if plan.engine == "march" else HYBRID_SAMPLES_PER_STORED_CYCLE
+    steps = settings.steps if plan.engine == "march" else EVENT_DRIVEN_SAMPLES_PER_STORED_CYCLE
     samples = max(2, settings.window) * steps
     width = 2.0 * n_modes + 12 + 6 * len(plan.model.rig.friction.interfaces)
     n_reversals = min(REVERSALS_PER_CYCLE * drive.cycles, structure.drive_sizes.MAX_EARLY_SAMPLES)

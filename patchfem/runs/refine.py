@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from .. import response
+from .. import measures as run_measures
 from ..core import Measure, Outcome
 from ..cost_model import measure_cpu_time
 from ..formatting import format_number
@@ -318,7 +318,7 @@ def bound_errors(measures: Measures, before: Measures) -> Measures:
 
 def is_main(name: str) -> bool:
     """Return whether a measure is one of those for whose sake a run is refined; warnings are about all measures."""
-    row = PATCH_TABLE.get(name) or response.rows.MOTION_TABLE.get(name)
+    row = PATCH_TABLE.get(name) or run_measures.rows.MOTION_TABLE.get(name)
     return row is not None and row.has("main")
 
 

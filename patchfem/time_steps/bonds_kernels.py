@@ -8,8 +8,6 @@ constant load it stores the energy of its mean deflection z/m; only that of its 
 
 from math import exp, sqrt
 
-from ..compiled.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_NO_REFCOUNT
-from ..compiled.jit import njit
 from ..friction.bonds.point_kernels import (
     MAX_SERIES_PATH,
     BondMoments,
@@ -21,6 +19,8 @@ from ..friction.bonds.point_kernels import (
     shape_functions,
     shape_series,
 )
+from ..kernel_cache.flags_kernels import FASTMATH_FLAGS, NJIT_CALL, NJIT_NO_REFCOUNT
+from ..kernel_cache.jit import njit
 from .step_rows_kernels import VECTOR, WIDTH, BondRow, Value
 
 MIN_LENGTH = 1e-9  # smallest bond length of the LuGre law relative to that at rest

@@ -14,7 +14,7 @@ from .step_rows_kernels import Law
 
 if TYPE_CHECKING:
     from ..contact.contact_sets import ContactSets
-    from ..slip.shear_modes import JenkinsSet, ShearModes
+    from ..partial_slip.shear_modes import JenkinsSet, ShearModes
 
 
 class BondSum(NamedTuple):

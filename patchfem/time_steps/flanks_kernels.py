@@ -8,8 +8,8 @@ does exactly the work of height, lifted mass and law. The normal force at the en
 
 from math import cos, sin, sqrt
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from .march_rows_kernels import Flank, Port, Sample
 
 GAUSS_POINT = sqrt(0.6)  # outer node of the Gauss rule of three points

@@ -1,7 +1,7 @@
 """Functions of the laws by their numbers (compiled)."""
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from ..kernel_cache.jit import njit
 from . import no_law_kernels as own
 from .bonds_kernels import slide_bonds
 from .bouc_wen_kernels import slide_bouc_wen

@@ -5,10 +5,10 @@ formed; a point that lifts off loses its bonds with the energy that they store. 
 a step slides points without a change of the lists, and an accepted step advances these.
 """
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
 from ..friction.bonds.strip_kernels import advance_list, slide_list
 from ..friction.bonds.strip_rows_kernels import BondList, ListLaw, ListState
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from .step_rows_kernels import ListRow, Value
 
 

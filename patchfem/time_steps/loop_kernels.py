@@ -5,9 +5,9 @@
 `system` is a `march_rows_kernels.System`. A step of level k lasts a whole step over 2^k.
 """
 
-from ..compiled.flags_kernels import NJIT_CALL, NJIT_KERNEL
-from ..compiled.jit import njit
 from ..contact.set_arrays import PRESENT_SLOT_INDEX
+from ..kernel_cache.flags_kernels import NJIT_CALL, NJIT_KERNEL
+from ..kernel_cache.jit import njit
 from . import flanks_kernels as flanks
 from . import march_kernels as steps
 from . import normal_kernels as normal

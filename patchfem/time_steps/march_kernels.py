@@ -35,8 +35,8 @@ none.
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from . import flanks_kernels as flanks
 from . import laws_kernels as laws
 from . import lists_kernels as lists
@@ -74,6 +74,7 @@ MAX_STALLS = 4  # iterations that do not halve the smallest residual, after whic
 # Largest residual of such a step relative to RESIDUAL, and that of lists, whose means have quadrature errors
 STALLED = 1e3
 LISTS_STALLED = 1e5
+LISTS_RESIDUAL = 1e3  # residual of lists relative to RESIDUAL: 1e-9 of the force, below the errors by which strips are joined
 LIST_CUTS = 30  # trials of a line search for lists
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
@@ -585,8 +586,9 @@ def solve_forces(system, level, step):
     has_lists = system.options.has_lists > 0
     has_potential = has_lists or (is_shortest(system, level) and not system.options.has_events)
     stalled = LISTS_STALLED if has_lists else STALLED
+    solved = LISTS_RESIDUAL if has_lists else 1.0
     for _ in range(MAX_NEWTON_ITERATIONS):
-        if residual <= 1.0 or (n_stalls >= MAX_STALLS and residual <= stalled):
+        if residual <= solved or (n_stalls >= MAX_STALLS and residual <= stalled):
             return True
         system.totals[Total.ITERATIONS] += 1
         if not find_newton_step(system, level, step):
@@ -609,7 +611,7 @@ def solve_forces(system, level, step):
             if change < 0:
                 return False
             residual = max(write_residual(system, level), change / LOAD_RESIDUAL)
-            if residual <= 1.0:
+            if residual <= solved:
                 break
             if has_potential:
                 slope = find_potential_slope(system, level)

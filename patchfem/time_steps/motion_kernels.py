@@ -5,8 +5,8 @@
 
 import numpy as np
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from . import flanks_kernels as flanks
 from .march_rows_kernels import LOWER, RESIDUAL, Flank, Port, Shear, Total
 from .step_rows_kernels import Value

@@ -1,7 +1,7 @@
 """Function of a law with a module of its own, for a march without one (compiled)."""
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 
 
 @njit(**NJIT_CALL)

@@ -1,7 +1,7 @@
 """Functions of `lists_kernels` for a march without lists of bonds, which calls none of them (compiled)."""
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 
 
 @njit(**NJIT_CALL)

@@ -3,8 +3,8 @@
 `find_motion_energy` and `find_holds` see to the modes; the others are not called.
 """
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from .motion_kernels import find_modal_energy, solve_holds
 
 

@@ -4,11 +4,11 @@
 pitch. The contact carries its reference load and moment, less the derivatives of its energy by heave and pitch.
 """
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
 from ..contact.press_kernels import compute_energy, find_set, press_state
 from ..contact.press_path_kernels import path_mean
 from ..contact.set_arrays import PRESENT_SLOT_INDEX, REFERENCE_LOAD_INDEX, REFERENCE_MOMENT_INDEX
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from .march_rows_kernels import Port, Sample
 from .motion_kernels import find_modal_energy, solve_holds, sum_products
 

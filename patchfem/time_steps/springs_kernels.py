@@ -2,8 +2,8 @@
 
 from math import sin
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from .step_rows_kernels import WIDTH, Value
 
 TWO_PI = 6.283185307179586

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
-from .. import compiled
+from .. import kernel_cache
 from ..contact.set_arrays import PRESENT_SLOT_INDEX, hash_set, make_set_arrays
 from ..core import ModalBasis
 from ..friction.bonds.list_numbers import join_lists, make_lists, make_no_lists
@@ -463,7 +463,7 @@ def make_no_sets():
 
 def press_first(system: System, contact: Contact) -> None:
     """Find the contact set of a patch at the start, and write its index to the counters of `system.sets`."""
-    press = compiled.load_compiled_module("contact.press_kernels")
+    press = kernel_cache.load_compiled_module("contact.press_kernels")
     name = hash_set(system.sets, contact.sets.in_contact)
     n = system.state.shape[1] // 2
     heave, pitch = (

@@ -11,8 +11,8 @@ velocity of a cubic in the middle, or of a line behind a spring, and 0 where thi
 
 from math import tanh
 
-from ..compiled.flags_kernels import NJIT_CALL
-from ..compiled.jit import njit
+from ..kernel_cache.flags_kernels import NJIT_CALL
+from ..kernel_cache.jit import njit
 from .step_rows_kernels import WIDTH, Value
 
 MAX_ITERATIONS = 60  # iterations of Newton's method, which ends after about 8

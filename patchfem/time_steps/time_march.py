@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import compiled
+from .. import kernel_cache
 from ..core import ModalBasis, Outcome, Response, SineDrive
 from ..friction.bonds.strip_rows_kernels import ListState
 from ..friction.path_work import sampled_work
@@ -134,7 +134,7 @@ def load_kernels(contact: Contact, say=None):
     say : callable, optional
         Callback for a line of text.
     """
-    compiled.report_compilation_to(say)
+    kernel_cache.report_compilation_to(say)
     parts = {}
     if contact.sets is None:
         parts["normal"] = "time_steps.no_normal_kernels"
@@ -142,9 +142,9 @@ def load_kernels(contact: Contact, say=None):
     if not contact.has_lists:
         step_parts["lists"] = "time_steps.no_lists_kernels"
     if module := contact.law_module:
-        step_parts["laws"] = compiled.instantiate("time_steps.laws_kernels", {"own": module})
-    steps = compiled.instantiate("time_steps.march_kernels", step_parts)
-    return compiled.instantiate("time_steps.loop_kernels", parts | {"steps": steps})
+        step_parts["laws"] = kernel_cache.instantiate("time_steps.laws_kernels", {"own": module})
+    steps = kernel_cache.instantiate("time_steps.march_kernels", step_parts)
+    return kernel_cache.instantiate("time_steps.loop_kernels", parts | {"steps": steps})
 
 
 def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from patchfem.core import ModalBasis, SineDrive, frozen_array
-from patchfem.hybrid import cases, drives, runs
-from patchfem.hybrid.records import LawNumbers
+from patchfem.event_driven import cases, drives, runs
+from patchfem.event_driven.records import LawNumbers
 
 
 def basis(omega, zeta, slide, base) -> ModalBasis:
@@ -64,7 +64,7 @@ def run_motion(
 
     Returns
     -------
-    hybrid.runs.Motion
+    event_driven.runs.Motion
     """
     signal = drives.make_signal(drive)
     interfaces = [

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from patchfem import compiled
+from patchfem import kernel_cache
 from patchfem.core import InitialState, ModalBasis
 from patchfem.structure.histories import find_accelerations
 
@@ -43,7 +43,9 @@ class Law(NamedTuple):
 def load_kernels():
     """Return the compiled loops, whose machine code is stored as that of the package."""
     text = KERNELS.read_text("utf-8")
-    return compiled.make_kernel_module(f"report_methods_{compiled.hash_text(text)}", text, KERNELS)
+    return kernel_cache.make_kernel_module(
+        f"report_methods_{kernel_cache.hash_text(text)}", text, KERNELS
+    )
 
 
 def coulomb(limit: float, stick_speed: float = 0.0) -> Law:

@@ -10,8 +10,8 @@ from math import tanh
 
 import numpy as np
 
-from patchfem.compiled import njit
-from patchfem.compiled.flags_kernels import NJIT_NO_REFCOUNT
+from patchfem.kernel_cache import njit
+from patchfem.kernel_cache.flags_kernels import NJIT_NO_REFCOUNT
 
 # kinds of laws
 COULOMB = 0

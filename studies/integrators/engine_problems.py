@@ -12,9 +12,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import problems
 
 from patchfem.core import InitialState, ModalBasis
+from patchfem.event_driven.cases import EXACT_RTOL
+from patchfem.event_driven.laws import masing
 from patchfem.friction.laws.coulomb import Coulomb
-from patchfem.hybrid.cases import EXACT_RTOL
-from patchfem.hybrid.laws import masing
 from patchfem.model import build
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.interfaces.joints import list_joints
@@ -95,7 +95,7 @@ def problem(name: str) -> Problem:
             60,
             {"limit": problems.SDOF_LIMIT, "xi": 0.003},
         )
-        return replace(made, truth=hybrid(made, EXACT_RTOL))
+        return replace(made, truth=event_driven(made, EXACT_RTOL))
     if name == "two":
         made = Problem(
             name,
@@ -105,7 +105,7 @@ def problem(name: str) -> Problem:
             20,
             {"limit": problems.TWO_LIMIT, "omega": 1.14},
         )
-        return replace(made, truth=hybrid(made, EXACT_RTOL))
+        return replace(made, truth=event_driven(made, EXACT_RTOL))
     model = build(
         scene.load(
             FOLDER / "patch.toml", ["contact.element_size=0.2 mm", "accuracy.tolerance=1e-3"]
@@ -143,7 +143,7 @@ def problem(name: str) -> Problem:
     return replace(made, truth=march(made, TRUTH))
 
 
-def hybrid(one: Problem, rtol: float) -> np.ndarray:
+def event_driven(one: Problem, rtol: float) -> np.ndarray:
     """Integrate from event to event by steps of order 8 with the step tolerance `rtol`."""
     if one.elements is None:
         law = problems.make_coulomb(one.limit)

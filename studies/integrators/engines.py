@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from engine_problems import ALL, POINT, POINTS, Problem, hybrid, march
+from engine_problems import ALL, POINT, POINTS, Problem, event_driven, march
 from report_methods import Motion, coulomb, solve_duhamel, solve_euler, solve_newmark
 from switched import PROBLEMS, follow
 
@@ -151,7 +151,7 @@ def dop853(one: Problem, tolerance: float) -> np.ndarray:
 COARSE = (100, 200, 400, 800, 1600, 3200, 6400)
 FINE = (1000, 2000, 4000, 8000, 16000, 32000)
 OURS = {  # {name: (callable, accuracy settings, problems)}; a further integrator is a further entry
-    "hybrid": (hybrid, (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12), ALL),
+    "event_driven": (event_driven, (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12), ALL),
     "march": (march, (*COARSE, 12800, 25600), ALL),
     "duhamel, report": (duhamel_report, COARSE, POINT),
     "duhamel, static branch": (duhamel_cured, COARSE, POINT),

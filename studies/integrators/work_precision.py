@@ -1,18 +1,18 @@
 """How much time does each integrator need for how small an error?
 
 The error is the largest one of the slide over the last 5 of 60 (block) or 20 cycles, relative to its largest value; the
-time is CPU time of one core, the least of three runs. For an error of 1e-6 the engine `hybrid`, which moves from event to
-event by steps of order 8, takes 5 ms for stick-slip of a block at resonance (Coulomb friction, 240 events); CVODE of
-SUNDIALS with its root finder takes 23 times as long, DOP853 of SciPy with events at most 39 times, and the engine `march` of
-fixed steps at most 4 times. Siconos (theta = 1/2) takes 110 times as long for 1e-4. On the two masses of Fig 16 CVODE takes
-12 times and DOP853 11 times as long for 1e-6, Siconos 67 times for 1e-4. The reference motion of both is that of `hybrid`
-with a step tolerance of 1e-12; DOP853 agrees with it to 3e-12 and 7e-11, CVODE to 3e-11 and 3e-10.
+time is CPU time of one core, the least of three runs. For an error of 1e-6 the engine `event_driven`, which moves from
+event to event by steps of order 8, takes 5 ms for stick-slip of a block at resonance (Coulomb friction, 240 events); CVODE
+of SUNDIALS with its root finder takes 23 times as long, DOP853 of SciPy with events at most 39 times, and the engine
+`march` of fixed steps at most 4 times. Siconos (theta = 1/2) takes 110 times as long for 1e-4. On the two masses of Fig 16
+CVODE takes 12 times and DOP853 11 times as long for 1e-6, Siconos 67 times for 1e-4. The reference motion of both is that
+of `event_driven` with a step tolerance of 1e-12; DOP853 agrees with it to 3e-12 and 7e-11, CVODE to 3e-11 and 3e-10.
 
-A patch that slips part by part (41 parallel elements, two modes) has no closed form; the reference is a march of 204 800
-steps a cycle. For 1e-4 `hybrid` takes 42 ms, the march 3.3 times, CVODE 7.7 times and DOP853 16 times as long; for 1e-6
-CVODE takes 20 times and DOP853 120 times as long. At 1e-2 the march is as fast as `hybrid`. CVODE and DOP853 need a longest
-step: with 1/8 of a cycle DOP853 misses 14 of the 202 reversals of the patch and is still 3 % wrong at a tolerance of 1e-9;
-without one it finds 4 of the 240 events of the block.
+A patch that slips part by part (41 parallel elements, two modes) has no closed form; the reference is a march of 204
+800 steps a cycle. For 1e-4 `event_driven` takes 42 ms, the march 3.3 times, CVODE 7.7 times and DOP853 16 times as
+long; for 1e-6 CVODE takes 20 times and DOP853 120 times as long. At 1e-2 the march is as fast as `event_driven`. CVODE
+and DOP853 need a longest step: with 1/8 of a cycle DOP853 misses 14 of the 202 reversals of the patch and is still 3 %
+wrong at a tolerance of 1e-9; without one it finds 4 of the 240 events of the block.
 
 The methods of the report, with fixed steps: Duhamel's integral with sgn(v) and a velocity criterion keeps an error above
 3 % on the two masses and above .5 % on the block. Newmark's method with a fixed stick speed keeps an error above 5 %. Euler
@@ -51,7 +51,7 @@ TITLES = {
 }
 SHOWN_PROBLEMS = ("block", "two", "patch")
 STYLES = {
-    "hybrid": ("*", "#8b1a1a"),
+    "event_driven": ("*", "#8b1a1a"),
     "march": ("o", BLUE),
     "duhamel, report": ("v", "#b9c7d6"),
     "duhamel, static branch": ("^", "#7fa6cc"),
@@ -109,7 +109,7 @@ def report(table: dict) -> None:
                 f"{1e3 * row['seconds']:9.2f} ms"
             )
     for where in dict.fromkeys(r["problem"] for r in table["rows"]):
-        reference = {"decay": "newmark, and force"}.get(where, "hybrid")
+        reference = {"decay": "newmark, and force"}.get(where, "event_driven")
         print(f"{TITLES[where]}: CPU time over that of '{reference}' at an error of {EQUAL}")
         for name, found in ratios(table["rows"], where, reference).items():
             print(f"  {name:24} " + "  ".join(f"{found[error]:>9}" for error in EQUAL))

@@ -29,7 +29,7 @@ from study_run import run_study
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.response.measures import compute_harmonic
+from patchfem.measures.measures import compute_harmonic
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

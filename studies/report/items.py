@@ -83,7 +83,7 @@ ITEMS = (
         "a mass with friction, held to the frame by a spring and a dashpot",
         BLOCK,
         _figure("s_2_3"),
-        "tests/hybrid/test_hybrid_closed_forms.py",
+        "tests/event_driven/test_event_driven_closed_forms.py",
         "works",
     ),
     Item(
@@ -115,7 +115,7 @@ ITEMS = (
         "other models, such as micro-slip, instead of a fully stuck contact",
         RIG,
         "studies/friction_ladder/ladder.py",
-        "tests/slip/test_partial_slip.py",
+        "tests/partial_slip/test_partial_slip.py",
         "works",
     ),
     Item(
@@ -260,7 +260,7 @@ ITEMS = (
         "any transient load, or a sweep over a range of frequencies",
         RIG,
         "studies/steady/fold.py",
-        "tests/hybrid/test_hybrid_reference.py",
+        "tests/event_driven/test_event_driven_reference.py",
         "works",
     ),
     Item(
@@ -300,7 +300,7 @@ ITEMS = (
         "the simplified law, elastic up to the friction limit",
         BLOCK,
         "studies/integrators/failure.py",
-        "tests/hybrid/test_hybrid_closed_forms.py",
+        "tests/event_driven/test_event_driven_closed_forms.py",
         "works",
     ),
     Item(
@@ -390,7 +390,7 @@ ITEMS = (
         "slip begins at 4 g at all frequencies and distorts the acceleration",
         RIG,
         "studies/table_1/levels.py",
-        "tests/response/test_levels.py",
+        "tests/measures/test_levels.py",
         "in part: a rigid block does so; the patch of rig.toml, which slips part by part, distorts it by 3 % from 3.39 g "
         "(135 Hz) to 2.96 g (155 Hz) on",
     ),
@@ -517,7 +517,7 @@ ITEMS = (
         "relative and absolute acceleration",
         BLOCK,
         _figure("s_2_3"),
-        "tests/response/test_measures.py",
+        "tests/measures/test_measures.py",
         "works",
     ),
     Item(
@@ -541,7 +541,7 @@ ITEMS = (
         "any number of interfaces",
         TWO,
         "",
-        "tests/hybrid/test_hybrid_hard_cases.py",
+        "tests/event_driven/test_event_driven_hard_cases.py",
         "works",
     ),
     Item(

@@ -13,8 +13,8 @@ from scipy import signal
 from scipy.optimize import least_squares
 
 import patchfem as pf
-from patchfem.hybrid import runs
-from patchfem.hybrid.cases import EXACT_RTOL, Schedule, make_rig_case
+from patchfem.event_driven import runs
+from patchfem.event_driven.cases import EXACT_RTOL, Schedule, make_rig_case
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.interfaces.contact_points import make_contact
 from patchfem.runs.rig.joints import make_joints

@@ -22,9 +22,9 @@ import numpy as np
 from study_run import run_study
 
 import patchfem as pf
+from patchfem.partial_slip import make_jenkins_set
 from patchfem.runs import run as runner
 from patchfem.scene import scene
-from patchfem.slip import make_jenkins_set
 
 FOLDER = Path(__file__).parent
 TILTS = (0.0, 1e-5, 1e-4, 1e-3)

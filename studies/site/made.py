@@ -26,7 +26,7 @@ import patchfem as pf
 from patchfem.commands.sources import read_sources
 from patchfem.effects import EFFECTS, LAWS
 from patchfem.formatting import format_value
-from patchfem.response.rows import MOTION_MEASURE_ROWS
+from patchfem.measures.rows import MOTION_MEASURE_ROWS
 from patchfem.runs.results.patch_rows import PATCH_TABLE
 from patchfem.scene.keys.types import list_keys
 

@@ -37,14 +37,14 @@ import numpy as np
 from scipy.integrate import DOP853
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
-from engine_problems import hybrid, problem
+from engine_problems import event_driven, problem
 from engines import dop853
 from measuring import measure_seconds, run
 from rig_texts import STUDIES
 
 import patchfem as pf
-from patchfem.hybrid import cases as engine_cases
-from patchfem.hybrid.runs import run_case
+from patchfem.event_driven import cases as engine_cases
+from patchfem.event_driven.runs import run_case
 from patchfem.runs import choose_numerics
 from patchfem.runs.rig.joints import make_joints
 
@@ -307,10 +307,10 @@ def measure_sweep(name: str, share: float, seed: int = 1) -> Row:
 def measure_dop853() -> Row:
     """Measure a run of the event-driven engine and one of DOP853 whose error is not larger."""
     block = problem("block")
-    error = block.error(hybrid(block, engine_cases.DEFAULT_RTOL))
+    error = block.error(event_driven(block, engine_cases.DEFAULT_RTOL))
     tolerances = (10.0**-digits for digits in range(4, 14))
     tolerance = next(rtol for rtol in tolerances if block.error(dop853(block, rtol)) <= error)
-    ours = measure_median(lambda: hybrid(block, engine_cases.DEFAULT_RTOL))
+    ours = measure_median(lambda: event_driven(block, engine_cases.DEFAULT_RTOL))
     theirs = measure_median(lambda: dop853(block, tolerance))
     return Row("peer", f"block, error {error:.0e}", 1e3 * ours, 1e3 * theirs)
 

@@ -23,7 +23,7 @@ import steady_pictures
 from rig_texts import ONE_MODE, TEXTS
 from study_run import run_study
 
-from patchfem.hybrid.free_motions import FreeMotions
+from patchfem.event_driven.free_motions import FreeMotions
 from patchfem.model import build
 from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs import run as runner

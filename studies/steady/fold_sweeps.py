@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.response import locate_reversals
+from patchfem.measures import locate_reversals
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 

@@ -27,8 +27,8 @@ from drawing import BLUE, GREY, ORANGE, drawing
 from study_run import run_study
 
 from patchfem.core import G_N
+from patchfem.measures import make_onset_test
 from patchfem.model import build
-from patchfem.response import make_onset_test
 from patchfem.runs import choose_numerics
 from patchfem.runs import run as runner
 from patchfem.runs.patch.press import solve_patch_contact

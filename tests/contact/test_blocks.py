@@ -14,14 +14,14 @@ from patchfem.contact.cell_edges import compute_contact_stiffness
 from patchfem.contact.press_cells import press_cells
 from patchfem.core import NotConverged, PatchfemError
 from patchfem.elasticity import BlockShape, Layers, make_stack, sides
-from patchfem.slip.first_loading import (
+from patchfem.partial_slip.first_loading import (
     SLIP,
     STICK,
     find_reversal,
     make_cell_elements,
     slip_from_rest,
 )
-from patchfem.slip.shear_modes import shear_modes
+from patchfem.partial_slip.shear_modes import shear_modes
 
 LENGTH, HEIGHT, LOAD = 12.7e-3, 6.35e-3, 115.6538
 TITANIUM = (121e9, 0.32)

@@ -18,7 +18,7 @@ from patchfem.contact.waves import compute_wave_compliance
 from patchfem.elasticity import BlockShape, Layers, LayerStack, Piece, make_stack
 from patchfem.elasticity.elasticity import lame_constants
 from patchfem.mesh import TensorGrid
-from patchfem.slip.first_loading import STICK, find_reversal, make_cell_elements
+from patchfem.partial_slip.first_loading import STICK, find_reversal, make_cell_elements
 
 LENGTH, HEIGHT, THICKNESS = 12.7e-3, 6.35e-3, 0.1524e-3
 LOAD = 100.0

@@ -5,8 +5,8 @@ from reference.keys import FILE, Equations, format_effects, iterate_tables, text
 
 from patchfem.effects import EFFECTS
 from patchfem.export.quantities import QUANTITIES
-from patchfem.response import INTERNAL_VALUES
-from patchfem.response import MOTION_TABLE as MOTION
+from patchfem.measures import INTERNAL_VALUES
+from patchfem.measures import MOTION_TABLE as MOTION
 from patchfem.runs import PATCH_TABLE as STATIC
 from patchfem.scene import MATERIALS, UNIT_FACTORS, parse_quantity
 from patchfem.scene.keys.types import list_keys

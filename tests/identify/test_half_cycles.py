@@ -6,7 +6,7 @@ import pytest
 from patchfem.core import PatchfemError
 from patchfem.identify import compute_decay_curve
 from patchfem.identify.half_cycles import find_half_cycles
-from patchfem.response import fit_decay_curve
+from patchfem.measures import fit_decay_curve
 
 
 def viscous_decay(rng):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import patchfem as pf
+from patchfem.partial_slip.first_loading import make_cell_elements
 from patchfem.runs.patch import area
-from patchfem.slip.first_loading import make_cell_elements
 
 LOAD = 26 * 4.4482216152605  # N
 SIDE, HEIGHT = 12.7e-3, 6.35e-3  # m

@@ -78,7 +78,7 @@ RUNS = {  # Kind of run: text, table of the law, effects and engines.
         METHODS,
     ),
 }
-METHODS_OF_ENGINES = {"exact": "hybrid", "march": "march", "harmonic": "harmonic"}
+METHODS_OF_ENGINES = {"exact": "event_driven", "march": "march", "harmonic": "harmonic"}
 
 
 class TimeLoopReached(Exception):

@@ -48,7 +48,7 @@ def test_exact_block_on_a_heavy_frame_is_solved_from_event_to_event():
         for method in ("auto", "exact", "march")
     }
     engines = [result.settings.engine for result in runs.values()]
-    assert engines == ["hybrid", "hybrid", "march"]
+    assert engines == ["event_driven", "event_driven", "march"]
     for name in ("relative_displacement_amplitude", "loop_area", "stick_fraction"):
         auto, exact, march = (result.measures[name] for result in runs.values())
         assert abs(auto.value - exact.value) <= auto.error + exact.error

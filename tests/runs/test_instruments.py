@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from patchfem import run
-from patchfem.response import read_instrument
+from patchfem.measures import read_instrument
 from patchfem.scene import loads
 
 MODES = """

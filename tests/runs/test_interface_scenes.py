@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.response import EVENT_KIND_NAMES
+from patchfem.measures import EVENT_KIND_NAMES
 
 FIG16 = f"""\
 [structure]

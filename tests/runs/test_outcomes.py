@@ -278,18 +278,18 @@ SHORT_BONDS = "friction.bond_length=0.1 nm; friction.kinetic=0.2; friction.rest_
 MANY = COATED.replace("0.5 mm", "10 um") + SHEAR + PLASTIC + KILOGRAM + DRIVE
 BOND_RIG = POINT + NONLOCAL.replace("1 um", "5 um") + STRUCTURE
 ENGINES = [  # Scene, changes and the engine that a plan chooses.
-    (PLASTIC_RIG, "", "hybrid"),
+    (PLASTIC_RIG, "", "event_driven"),
     (PLASTIC_RIG, "accuracy.steps_per_cycle=400", "march"),
-    (PLASTIC_RIG, "structure.stiffening.cubic=1e12 N/m^3", "hybrid"),
-    (POINT + PLASTIC + MODE + SWEEP, "", "hybrid"),
-    (IWAN_RIG, "", "hybrid"),
-    (MANY, "", "hybrid"),  # 1271 elements slip one after the other
-    (MANY, "drive.cycles=10030", "hybrid"),
-    (BOND_RIG, GROWING, "hybrid"),
-    (POINT + make_friction_table("lugre") + STRUCTURE, "friction.stribeck_speed=1 cm/s", "hybrid"),
+    (PLASTIC_RIG, "structure.stiffening.cubic=1e12 N/m^3", "event_driven"),
+    (POINT + PLASTIC + MODE + SWEEP, "", "event_driven"),
+    (IWAN_RIG, "", "event_driven"),
+    (MANY, "", "event_driven"),  # 1271 elements slip one after the other
+    (MANY, "drive.cycles=10030", "event_driven"),
+    (BOND_RIG, GROWING, "event_driven"),
+    (POINT + make_friction_table("lugre") + STRUCTURE, "friction.stribeck_speed=1 cm/s", "event_driven"),
     (BOND_RIG, "friction.order=0.5", "march"),
-    (POINT + NONLOCAL + LEVELS, "", "hybrid"),
-    (BOND_RIG, "structure.stiffening.cubic=1e12 N/m^3", "hybrid"),
+    (POINT + NONLOCAL + LEVELS, "", "event_driven"),
+    (BOND_RIG, "structure.stiffening.cubic=1e12 N/m^3", "event_driven"),
     (POINT + COULOMB + SLIDE, "", "bench, closed form"),
     (POINT + PLASTIC + SLIDE, "", "bench, parallel elements"),
     (POINT + NONLOCAL + SLIDE, "", "bench, contact points"),

@@ -1,4 +1,4 @@
-"""Rigs with smooth friction laws: the choice of the engine `hybrid`, and its agreement with the march."""
+"""Rigs with smooth friction laws: the choice of the engine `event_driven`, and its agreement with the march."""
 
 import numpy as np
 import pytest
@@ -115,7 +115,7 @@ def test_exact_run_that_ends_in_first_cycle_has_rising_times():
     different times and the travel as its largest output."""
     text = SCENE.replace(CONSTANT_BONDS, GROWING_BONDS)
     result = pf.run(text.replace("[structure]\n", '[structure]\ntravel = "20 um"\n'))
-    assert (result.settings.engine, result.outcome) == ("hybrid", "exceeds_travel")
+    assert (result.settings.engine, result.outcome) == ("event_driven", "exceeds_travel")
     for histories in (result.window, result.response):
         assert (np.diff(histories.time) > 0).all()
     assert np.abs(result.window.output).max() == pytest.approx(20e-6, rel=1e-9)

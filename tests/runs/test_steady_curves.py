@@ -20,7 +20,7 @@ from scene_texts import (
 
 import patchfem as pf
 from patchfem.core import NotConverged
-from patchfem.response.rows import AMPLITUDE
+from patchfem.measures.rows import AMPLITUDE
 from patchfem.runs.rig.engines import choose_numerics
 from patchfem.runs.rig.steady import shooting
 from patchfem.runs.rig.steady.curves import COLUMN_MEASURES

@@ -17,11 +17,14 @@ from scene_texts import (
     make_friction_table,
 )
 
-HYBRID, MARCH = POINT + COULOMB + MODE, POINT + NONLOCAL.replace("1 um", "3 um") + MODE + SECOND
+EVENT_DRIVEN, MARCH = (
+    POINT + COULOMB + MODE,
+    POINT + NONLOCAL.replace("1 um", "3 um") + MODE + SECOND,
+)
 BASE = '[drive]\nkind = "base"\nacceleration = "6 g"\n'
 FREE = '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\n'
 CASES = {  # Scene and changes.
-    "sine": (HYBRID + DRIVE, ""),
+    "sine": (EVENT_DRIVEN + DRIVE, ""),
     "two modes": (POINT + COULOMB + MODE + SECOND + FREE, "drive.duration=1 ms"),
     "release": (POINT + make_friction_table("tanh") + MODE + FREE, "drive.duration=0.1 s"),
     "marched release": (MARCH + FREE, "accuracy.method=march; drive.duration=0.1 s"),
@@ -30,11 +33,11 @@ CASES = {  # Scene and changes.
         'accuracy.method=march; drive.waveform=levels; drive.levels=["4 g", "6 g"]; drive.cycles=15',
     ),
     "step": (
-        HYBRID + '[drive]\nkind = "force"\nwaveform = "step"\nforce = "100 N"\n',
+        EVENT_DRIVEN + '[drive]\nkind = "force"\nwaveform = "step"\nforce = "100 N"\n',
         "drive.duration=0.1 s",
     ),
     "sweep": (
-        HYBRID + BASE,
+        EVENT_DRIVEN + BASE,
         "accuracy.method=march; drive.waveform=sweep; drive.from=135 Hz; drive.to=150 Hz; drive.rate=60 Hz/s",
     ),
     "file": (MARCH + BASE.replace('acceleration = "6 g"\n', ""), "drive.waveform=file; drive.file=a.csv"),

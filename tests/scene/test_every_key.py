@@ -175,7 +175,7 @@ def test_always_key_changes_result_or_gives_remark(scene):
 def test_always_unused_steps_per_cycle_give_remark(method):
     """The key steps_per_cycle gives a remark with engines that have no time steps."""
     text = SCENES["exact rig"] + f'[accuracy]\nmethod = "{method}"\nsteps_per_cycle = 60\n'
-    engine = "harmonic" if method == "harmonic" else "hybrid"
+    engine = "harmonic" if method == "harmonic" else "event_driven"
     told = (
         f"accuracy.steps_per_cycle has no meaning for engine '{engine}', which does not use steps of equal length, and "
         "is not used"

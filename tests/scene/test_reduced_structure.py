@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.io import mmwrite
 
 import patchfem as pf
-from patchfem.response import ERROR_MEASURES
+from patchfem.measures import ERROR_MEASURES
 
 COUNT = 16
 SCENE = """\

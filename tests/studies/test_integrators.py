@@ -36,7 +36,7 @@ def test_exact_dop853_restarted_at_events(engines, problem, where):
 
 def test_exact_free_decay_by_the_event_driven_solver(engines, problem):
     """The event-driven solver agrees with the closed form of free decay within 1e-11."""
-    run, settings, problems = engines.OURS["hybrid"]
+    run, settings, problems = engines.OURS["event_driven"]
     case = problem("decay")
     assert "decay" in problems and case.error(run(case, settings[-1])) < 1e-11
 
@@ -69,7 +69,7 @@ def test_exact_saved_table_supports_the_stated_conclusions(work, table):
         assert curve(where, "SUNDIALS CVODE").min() < 1e-9
     assert curve("block", "euler, tanh").min() > 0.015  # error of the regularised law
     # error of the reference solution, a march of 204800 steps
-    for name in ("SUNDIALS CVODE", "hybrid"):
+    for name in ("SUNDIALS CVODE", "event_driven"):
         assert curve("patch", name).min() < 1e-7
     march = curve("patch", "march")
     assert march[0] / march[-1] > 1e4
@@ -81,6 +81,6 @@ def test_exact_saved_table_supports_the_stated_conclusions(work, table):
         ("patch", 1e-4, {"march": 3.3, "SUNDIALS CVODE": 7.7, "DOP853 + events": 16}),
         ("patch", 1e-6, {"SUNDIALS CVODE": 20, "DOP853 + events": 120}),
     ):
-        found = work.ratios(table["rows"], where, "hybrid")
+        found = work.ratios(table["rows"], where, "event_driven")
         for name, ratio in stated.items():
             assert float(found[name][error].strip("<> ")) == pytest.approx(ratio, rel=0.05)

@@ -26,7 +26,7 @@ class Import(NamedTuple):
     target: str
     name: str  # Name imported from the target, "" for the module itself.
     is_own: bool  # The target belongs to the package.
-    # The module is named by a string, as in `compiled.load_compiled_module("hybrid.engine_kernels")`.
+    # The module is named by a string, as in `compiled.load_compiled_module("event_driven.engine_kernels")`.
     is_text: bool
 
 

@@ -6,7 +6,7 @@ from scene_texts import MODE
 
 import patchfem as pf
 from patchfem.api import get_base_scene
-from patchfem.response import MOTION_TABLE as MOTION
+from patchfem.measures import MOTION_TABLE as MOTION
 from patchfem.runs import PATCH_TABLE as STATIC
 from patchfem.scene import format_assignments
 

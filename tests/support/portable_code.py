@@ -1,6 +1,6 @@
 """Make the portable code of the package: compile the functions that the usual scenes call, by numba.
 
-    python tests/support/portable_code.py          write patchfem/compiled/portable.xz
+    python tests/support/portable_code.py          write patchfem/kernel_cache/portable.xz
     python tests/support/portable_code.py FILE     write another file
 
 The file is made and committed at a release. Its text depends on the kernels and on the versions in its header alone; on
@@ -39,7 +39,7 @@ def pack_portable_codes(codes: dict[str, bytes], kernel_hash: str, versions: str
     versions : str
         Versions of what made the code, on which its text depends.
     """
-    from patchfem.compiled import machine
+    from patchfem.kernel_cache import machine
 
     sizes = {name: len(codes[name]) for name in sorted(codes)}
     header = {"kernels": kernel_hash, "versions": versions, "sizes": sizes}
@@ -56,10 +56,10 @@ def make_portable_codes() -> tuple[str, dict[str, bytes]]:
         from llvmlite import binding
 
         import patchfem as pf
-        from patchfem import compiled
-        from patchfem.compiled import machine
+        from patchfem import kernel_cache
+        from patchfem.kernel_cache import machine
 
-        compiled.list_portable_codes = dict  # numba compiles although there is a file
+        kernel_cache.list_portable_codes = dict  # numba compiles although there is a file
         for scene in RUNS:
             pf.run(scene)
         pf.sweep(*SWEEP)
@@ -73,10 +73,12 @@ def make_portable_codes() -> tuple[str, dict[str, bytes]]:
 def main(path: str = "") -> None:
     """Write the file."""
     versions, codes = make_portable_codes()
-    from patchfem import compiled
-    from patchfem.compiled import portable
+    from patchfem import kernel_cache
+    from patchfem.kernel_cache import portable
 
-    data = lzma.compress(pack_portable_codes(codes, compiled.hash_kernels(), versions), preset=9)
+    data = lzma.compress(
+        pack_portable_codes(codes, kernel_cache.hash_kernels(), versions), preset=9
+    )
     Path(path or portable.PORTABLE_PATH).write_bytes(data)
     print(f"{len(codes)} functions, {len(data)} bytes, made with {versions}")
 

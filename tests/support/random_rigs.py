@@ -1,4 +1,4 @@
-"""Random rigs for the engine `hybrid`, with their measures by an independent program.
+"""Random rigs for the engine `event_driven`, with their measures by an independent program.
 
 `random_rigs.json` has a spec of plain numbers for each rig: modes, faces, drive, start and cycles in SI units. They were
 drawn by chance: 1 to 5 modes of 60 to 400 Hz with damping ratios of 0.1 to 3 %; 1 to 4 interfaces, each with one of the
@@ -15,12 +15,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from patchfem.core import ModalBasis
+from patchfem.event_driven import cases, drives, runs
+from patchfem.event_driven.laws import make_law, masing
+from patchfem.event_driven.records import LawNumbers
 from patchfem.friction import make_law as make_friction_law
-from patchfem.hybrid import cases, drives, runs
-from patchfem.hybrid.laws import make_law, masing
-from patchfem.hybrid.records import LawNumbers
 from patchfem.model import make_bond_parameters
-from patchfem.runs.rig.engines import estimate_hybrid_errors
+from patchfem.runs.rig.engines import estimate_event_driven_errors
 
 # Names of the rigs are the seeds by which they were drawn.
 RIGS = json.loads(Path(__file__).with_suffix(".json").read_text("utf-8"))
@@ -76,7 +76,7 @@ def compare_with_reference(spec: dict, true: dict) -> dict:
     rtol = cases.DEFAULT_RTOL
     values = runs.run_case(make_case(spec)).values
     coarse = make_case(spec, runs.COARSE * rtol, cases.MIN_STEPS / runs.COARSE_STEP)
-    errors = estimate_hybrid_errors(values, runs.run_case(coarse).values, rtol)
+    errors = estimate_event_driven_errors(values, runs.run_case(coarse).values, rtol)
     sizes = {
         "relative_displacement_amplitude": spec["length"],
         "absolute_acceleration_peak": spec["acceleration"],

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 from vibration_forms import shaken_rms
 
-from patchfem.response import stationary
+from patchfem.measures import stationary
 from patchfem.structure.noise import draw_random_record
 
 # Frequency [Hz], damping ratio, duration [s].

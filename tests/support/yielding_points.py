@@ -1,4 +1,4 @@
-"""Points with compliance that yield at a limit, solved without the elements of `patchfem.slip`."""
+"""Points with compliance that yield at a limit, solved without the elements of `patchfem.partial_slip`."""
 
 import numpy as np
 

@@ -14,9 +14,9 @@ from patchfem import load
 from patchfem.core import SineDrive
 from patchfem.friction import Bonds, Grooves
 from patchfem.motion_measures import energy_balance
+from patchfem.partial_slip.shear_modes import shear_modes
 from patchfem.runs.interfaces import contact_points
 from patchfem.scene.keys.tables import Friction
-from patchfem.slip.shear_modes import shear_modes
 from patchfem.time_steps import laws
 from patchfem.time_steps.contacts import Contact, PointSet
 from patchfem.time_steps.time_march import march

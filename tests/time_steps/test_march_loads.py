@@ -27,7 +27,7 @@ from varying_load_cases import (
 
 from patchfem.core import InitialState, SineDrive
 from patchfem.model.structure import compute_band_slides
-from patchfem.slip.shear_modes import find_sufficient_modes, shear_modes
+from patchfem.partial_slip.shear_modes import find_sufficient_modes, shear_modes
 
 # these laws share one compiled loop; Coulomb friction and the tanh law need others
 POINT_LAWS = [

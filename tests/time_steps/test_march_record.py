@@ -15,7 +15,7 @@ from varying_load_cases import LAWS, MIXED, crowned_contact, make_modes
 
 from patchfem.core import Outcome, SineDrive
 from patchfem.friction import Bonds
-from patchfem.slip.shear_modes import shear_modes
+from patchfem.partial_slip.shear_modes import shear_modes
 from patchfem.structure import drive_sizes
 from patchfem.time_steps import March, laws, march
 from patchfem.time_steps import time_march as engine

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from patchfem.compiled import load_compiled_module
 from patchfem.friction import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.iwan import Iwan
 from patchfem.friction.laws.lugre import LuGre
 from patchfem.friction.laws.tanh import TanhLaw
+from patchfem.kernel_cache import load_compiled_module
 from patchfem.time_steps import laws
 from patchfem.time_steps.step_rows_kernels import N_VALUES, WIDTH, Step, Value
 

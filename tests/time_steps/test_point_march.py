@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from march_contacts import make_coulomb
 
-from patchfem import compiled
+from patchfem import kernel_cache
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.time_steps import March, march
 from patchfem.time_steps.contacts import Contact, PointSet
@@ -47,4 +47,4 @@ def test_exact_rig_without_friction_shares_compiled_code():
     point = PointSet(make_coulomb(1.0, 1.0, LIMIT), np.ones(1))
     contacts = Contact([]), Contact([point], LIMIT)
     systems = [March(make_modes(), DRIVE, contact, 10).system for contact in contacts]
-    assert len({compiled.machine.convert_argument(system)[0] for system in systems}) == 1
+    assert len({kernel_cache.machine.convert_argument(system)[0] for system in systems}) == 1

@@ -13,7 +13,7 @@ from patchfem.friction.laws.iwan import Iwan
 from patchfem.friction.laws.lugre import LuGre
 from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.motion_measures import energy_balance
-from patchfem.slip import shear_modes
+from patchfem.partial_slip import shear_modes
 from patchfem.time_steps import find_stiffness, follow, laws, march
 from patchfem.time_steps.contacts import Contact, PointSet
 

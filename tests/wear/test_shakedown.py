@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import Piece, compute_interface_compliance
-from patchfem.slip import make_jenkins_set
+from patchfem.partial_slip import make_jenkins_set
 from patchfem.wear import WearProblem, make_initial_wear_state, take_jump
 
 

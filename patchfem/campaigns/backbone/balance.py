@@ -1,7 +1,7 @@
 """Backbone of a mode from periodic motions that a negative damping or a force at the output sustains.
 
-The motion is found by shooting (`hybrid.free_motions`), and without friction it is an eigenvector. A negative damping of
-all coordinates gives frequency and damping ratio (extended periodic motion: Krack, Comput. Struct. 154, 59, 2015). A
+The motion is found by shooting (`event_driven.free_motions`), and without friction it is an eigenvector. A negative damping
+of all coordinates gives frequency and damping ratio (extended periodic motion: Krack, Comput. Struct. 154, 59, 2015). A
 force at the output in phase with the velocity there gives the force of a test in phase resonance.
 """
 
@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
-from ...hybrid.cases import UndrivenRig
-from ...hybrid.free_motions import RATE_SCALE, ROUGH, FreeMotion, FreeMotions, estimate_errors
+from ...event_driven.cases import UndrivenRig
+from ...event_driven.free_motions import RATE_SCALE, ROUGH, FreeMotion, FreeMotions, estimate_errors
 from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Curve, make_curve
 

@@ -9,9 +9,9 @@ from scipy.optimize import brentq
 
 from ...core import NotConverged, PatchfemError
 from ...formatting import format_length
+from ...measures.errors import estimate_errors_from_finer
 from ...model.model import Model
 from ...model.source import locate_errors
-from ...response.errors import estimate_errors_from_finer
 from ...runs.joint import find_stuck_patch_stiffness
 from ...scene.keys.removed import describe_removed
 from . import words

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...effects import law_has_trait
-from ...hybrid.cases import UndrivenRig
+from ...event_driven.cases import UndrivenRig
 from ...model.model import Model
 from ...runs.joint import FreeRig, solve_without_joint
 from ...runs.patch.press import Patch

@@ -3,10 +3,10 @@
 import numpy as np
 
 from ...core import NotConverged, PatchfemError
+from ...event_driven import quasi_static
 from ...friction.protocol import SteadyLoop
 from ...friction.record import steady_loop
-from ...hybrid import quasi_static
-from ...response.errors import add_errors
+from ...measures.errors import add_errors
 from ...runs.rig import decays
 from ...runs.rig.rig import estimate_slide_errors
 from .balance import compute_constant_curve

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from ...measures.spectrum import read_instrument
 from ...model.model import Model
 from ...model.source import locate_errors
-from ...response.spectrum import read_instrument
 from ...runs.batch.motion_observer import MotionObserver
 from ...runs.joint import solve_without_joint
 from ..free_keys import solve_contact

@@ -12,7 +12,7 @@ from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.changes import SweepAnalysis, analyse
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError, remove_interface_number
-from ...response import rows
+from ...measures import rows
 from ...runs.batch.case_results import FAILED_OUTCOME
 from ...runs.results.patch_rows import PATCH_TABLE as STATIC
 from ...runs.results.result import describe_measure
@@ -129,7 +129,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
         )
 
     for name, low, high, _ in analysis.ranges[:MAX_MEASURE_RANGES]:
-        column = table.measures[name]
+        column = table.select_trusted(name)
         for word, case in (("smallest", low), ("largest", high)):
             quantities[f"{word}_{name}"] = Quantity(
                 column.values[case],

@@ -6,8 +6,8 @@ of x for reading = "stretch". The integral is x |x|^p times a smooth function, o
 
 from typing import NamedTuple
 
-from ...compiled.flags_kernels import NJIT_KERNEL
-from ...compiled.jit import njit
+from ...kernel_cache.flags_kernels import NJIT_KERNEL
+from ...kernel_cache.jit import njit
 from .list_math_kernels import fast_exp, power
 from .strip_rows_kernels import N_CELLS_PER_AGE, N_COEFFICIENTS, ListLaw
 

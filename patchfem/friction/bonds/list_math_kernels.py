@@ -6,8 +6,8 @@
 
 import numpy as np
 
-from ...compiled.flags_kernels import NJIT_NO_REFCOUNT
-from ...compiled.jit import njit
+from ...kernel_cache.flags_kernels import NJIT_NO_REFCOUNT
+from ...kernel_cache.jit import njit
 
 
 @njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)

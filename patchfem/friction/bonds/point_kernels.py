@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ...compiled.jit import njit
+from ...kernel_cache.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...kernel_cache.jit import njit
 from .point_rows_kernels import GROWTH
 
 # Largest path in bond lengths for which the power series SHAPE_SERIES is used; it is exact to round-off there

@@ -3,8 +3,8 @@
 from math import inf, sqrt
 from typing import NamedTuple
 
-from ...compiled.flags_kernels import NJIT_KERNEL
-from ...compiled.jit import njit
+from ...kernel_cache.flags_kernels import NJIT_KERNEL
+from ...kernel_cache.jit import njit
 from .decay_kernels import find_decay
 from .list_math_kernels import fast_exp
 from .strip_rows_kernels import EXACT_JOIN, N_STRIP_ENTRIES, ListLaw, ListState, Strip

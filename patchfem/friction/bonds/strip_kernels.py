@@ -7,8 +7,8 @@ energies are exact.
 from math import ceil, exp, expm1, log, sqrt
 from typing import NamedTuple
 
-from ...compiled.flags_kernels import NJIT_KERNEL
-from ...compiled.jit import njit
+from ...kernel_cache.flags_kernels import NJIT_KERNEL
+from ...kernel_cache.jit import njit
 from .decay_kernels import average_strength, find_moment
 from .list_math_kernels import power
 from .point_kernels import grow

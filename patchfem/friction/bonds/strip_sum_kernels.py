@@ -10,8 +10,8 @@ over an increment, along which x changes linearly, is exact. For reading = "stre
 from math import copysign, sqrt
 from typing import NamedTuple
 
-from ...compiled.flags_kernels import NJIT_KERNEL
-from ...compiled.jit import njit
+from ...kernel_cache.flags_kernels import NJIT_KERNEL
+from ...kernel_cache.jit import njit
 from .decay_kernels import (
     NJIT_INLINE,
     Decay,

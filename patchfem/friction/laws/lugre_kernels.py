@@ -8,8 +8,8 @@ path.
 from enum import IntEnum
 from math import exp
 
-from ...compiled.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ...compiled.jit import njit
+from ...kernel_cache.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...kernel_cache.jit import njit
 
 # Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must
 # not be 0

@@ -17,22 +17,16 @@ from ...core import Outcome, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds.parameters import Bonds
 from ...friction.record import make_law
-from ...model.model import Model
-from ...model.similar_models import SimilarModels, collect_columns, select_models
-from ...motion_measures import ratio_or_zero
-from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
-from ...points.laws import N_NUMBERS, POINT_LAWS, list_point_law
-from ...points.rows import Cases, Law, LawNumber, Number
-from ...response import rows
-from ...response.errors import ERROR_MEASURES, combine_errors, estimate_convergence_errors
-from ...response.outcome import (
+from ...measures import rows
+from ...measures.errors import ERROR_MEASURES, combine_errors, estimate_convergence_errors
+from ...measures.outcome import (
     AMPLITUDE_ROUND_OFF,
     describe_ringing,
     is_drifting,
     is_ringing_visible,
 )
-from ...response.reasons import CHANGE_NOT_RESOLVED_REASON, STICKS_AT_REVERSAL_REASON, find_missing
-from ...response.rows import (
+from ...measures.reasons import CHANGE_NOT_RESOLVED_REASON, STICKS_AT_REVERSAL_REASON, find_missing
+from ...measures.rows import (
     AMPLITUDE,
     INTERNAL_VALUES,
     MOTION_TABLE,
@@ -41,7 +35,7 @@ from ...response.rows import (
     find_larger_term,
     select_names,
 )
-from ...response.settling import (
+from ...measures.settling import (
     MOTION_CLASSES,
     MotionEnds,
     estimate_ringing,
@@ -49,6 +43,12 @@ from ...response.settling import (
     measure_windows,
     select_reported,
 )
+from ...model.model import Model
+from ...model.similar_models import SimilarModels, collect_columns, select_models
+from ...motion_measures import ratio_or_zero
+from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
+from ...points.laws import N_NUMBERS, POINT_LAWS, list_point_law
+from ...points.rows import Cases, Law, LawNumber, Number
 from ...scene.rules.accuracy import list_fixed_settings
 from ..results.notes import MAX_WORK_CHECK
 from ..results.result import shorten_file_names
@@ -435,7 +435,7 @@ def find_floor(name: str, values: dict[str, np.ndarray], group: Group) -> np.nda
     """Return the absolute part (n,) of the allowed error of a measure, in its unit.
 
     The allowed error is the tolerance times the value plus this floor. A small difference of large terms cannot have a
-    small relative error, so that the floor is at least the tolerance times these terms (`response.rows.find_larger_term`).
+    small relative error, so that the floor is at least the tolerance times these terms (`measures.rows.find_larger_term`).
 
     Parameters
     ----------

@@ -10,20 +10,20 @@ from time import process_time
 import numpy as np
 
 from ...core import Response, max_abs
-from ...motion_measures import energy_balance
-from ...response.loops import (
+from ...measures.loops import (
     choose_reversal_force_rule,
     find_reversals,
     measure_sampled_loop,
     sample_loop,
 )
-from ...response.measures import (
+from ...measures.measures import (
     compare_loop_work,
     compute_ledger_measures,
     compute_peak,
     compute_step_harmonic,
     interpolate_range,
 )
+from ...motion_measures import energy_balance
 from ..results.patch_rows import Values
 from .engine import Numerics, make_bench_numerics, sample_path
 from .slides import SlideHistories, SlideTask, follow_path

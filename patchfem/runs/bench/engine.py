@@ -31,13 +31,13 @@ class Numerics:
     """Numerical settings of a run of a rig or a bench.
 
     - engine: name of the engine.
-    - steps: time steps per cycle; of the engine `hybrid` the smallest number per shortest period of the drive.
+    - steps: time steps per cycle; of the engine `event_driven` the smallest number per shortest period of the drive.
     - cycles, window: number of cycles of the run, and of the window at its end.
     - shear_modes: number of shear modes; None: set by the tolerance.
     - choice: method of bond summation; None: set by the tolerance and the steps.
     - whole: whether the run stores the histories before the window, or draws the response curve beside its peak; coarse runs
       may omit them.
-    - local: largest relative error per step of the engine `hybrid`.
+    - local: largest relative error per step of the engine `event_driven`.
     - other_rig: index of the rig with other modes of a reduced structure, or None.
     - meshed: indices of the interfaces whose patches have a coarser mesh.
     - coarse_patch: how many times the mesh of the patch of [contact] is coarser by a factor of 2.
@@ -62,7 +62,7 @@ class Numerics:
     def finer(self):
         """Return finer settings for the next run.
 
-        The engine `hybrid` has a hundredth of the step error, and other engines have twice as many steps.
+        The engine `event_driven` has a hundredth of the step error, and other engines have twice as many steps.
         """
         if self.local:
             return replace(self, local=max(0.01 * self.local, MIN_RELATIVE_STEP_ERROR))

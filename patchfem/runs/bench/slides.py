@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import slip, time_steps
+from ... import partial_slip, time_steps
 from ...core import NotConverged
 from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import masing_loop
@@ -332,7 +332,9 @@ def _follow_elements(task: SlideTask) -> SlideHistories:
         loop = partial(masing_loop, found.stiffness, yields)
         history = masing.follow_masing(loop, float(found.stiffness @ yields), task.slide)
         states = masing.find_stretches(yields, task.slide, task.frames)
-        tau, local = slip.fields.compute_element_fields(task.patch, found, states, law.length)
+        tau, local = partial_slip.fields.compute_element_fields(
+            task.patch, found, states, law.length
+        )
 
     stored = history.work - history.loss
     ledger = stack_energies(np.diff(history.work), stored, np.diff(history.loss))

@@ -15,7 +15,7 @@ from ...contact import contact_sets
 from ...core import MIN_LOAD
 from ...effects import law_has_trait, law_takes_stiffness_or_length
 from ...model.model import Model
-from ...slip import shear_modes
+from ...partial_slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega
 from ...time_steps import contacts, laws, systems
 from ...time_steps.contacts import PointSet

@@ -17,10 +17,10 @@ from ...contact.cells import CellCompliance, make_block
 from ...contact.press_cells import FaceLoading, PressedCells, press_cells
 from ...core import Compliance, ContactState, Interface, Outcome, frozen_array
 from ...elasticity.sides import BlockShape
+from ...measures.errors import edge_errors, estimate_convergence_errors
 from ...model.face import compute_face_gap
 from ...model.patch import PatchModel
 from ...model.pieces import make_layer_stacks
-from ...response.errors import edge_errors, estimate_convergence_errors
 from ..refine import NO_LIMIT, Verdict, refine
 from ..results.patch_rows import CELLS_SOURCE, Values, make_measure
 from . import store

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...effects import law_has_trait
 from ...friction.record import make_law
-from ...response.errors import estimate_convergence_errors
-from ...slip import first_loading
+from ...measures.errors import estimate_convergence_errors
+from ...partial_slip import first_loading
 from ..results.patch_rows import CELLS_SOURCE, make_measure
 from . import jenkins_elements, store
 from .area import AreaPatch

@@ -1,6 +1,7 @@
 """Parallel Jenkins elements of a patch with partial slip, cached for all runs of the patch.
 
-In: a solved `Patch`, coefficient of friction and bond length. Out: a JenkinsSet (`slip.shear_modes`), or `PatchElements`.
+In: a solved `Patch`, coefficient of friction and bond length. Out: a JenkinsSet (`partial_slip.shear_modes`), or
+`PatchElements`.
 """
 
 from typing import NamedTuple
@@ -8,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import cell_edges, cells, stiffness
-from ...slip import first_loading, shear_modes
+from ...partial_slip import first_loading, shear_modes
 from . import store
 from .press import Patch
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import response
+from ... import measures as run_measures
 from ...core import (
     Measure,
     Outcome,
@@ -28,8 +28,6 @@ from . import patch_rows
 from .patch_rows import Arrays, Measures, Values
 
 N_INTERFACE_FRAMES = 16  # Number of frames of the interface fields in the last cycle.
-# Change of slip / largest change; above it, a node without friction limit slips.
-MIN_SLIP_CHANGE_FRACTION = 1e-2
 TRACTION_ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
 # Outcomes of motions without a periodic cycle.
 UNBOUNDED_OUTCOMES = (
@@ -197,11 +195,11 @@ class MotionData(NamedTuple):
 
     period: float | None = None
     energies: Values = MappingProxyType({})
-    step_runs: "tuple[response.errors.StepRun, ...]" = ()
-    levels: "tuple[response.events.Level, ...]" = ()
-    events: "response.events.Events | None" = None
-    decay: "response.decay_curve.DecayCurve | None" = None
-    spectra: "response.stationary.Spectra | None" = None
+    step_runs: "tuple[run_measures.errors.StepRun, ...]" = ()
+    levels: "tuple[run_measures.events.Level, ...]" = ()
+    events: "run_measures.events.Events | None" = None
+    decay: "run_measures.decay_curve.DecayCurve | None" = None
+    spectra: "run_measures.stationary.Spectra | None" = None
     steady: SteadyData | None = None
 
 
@@ -282,7 +280,7 @@ def describe_measure(name: str, numbered_kind: str = "interface") -> str:
         return patch_rows.PATCH_TABLE[name].text
 
     first = remove_interface_number(name)
-    row = patch_rows.PATCH_TABLE.get(first) or response.rows.find_definition(name)
+    row = patch_rows.PATCH_TABLE.get(first) or run_measures.rows.find_definition(name)
     return row.text + (
         "" if first == name else f"; of {numbered_kind} {name.removeprefix(first + '_')}"
     )
@@ -388,7 +386,8 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP_RULE) -> np.ndarray:
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
     if not rule.starts_at_rest:
         moved[1] = 0.0
-    min_fraction = MIN_SLIP_CHANGE_FRACTION if rule.limit is None else TRACTION_ROUND_OFF
+    # Change of slip / largest change; above it, a node without friction limit slips.
+    min_fraction = 1e-2 if rule.limit is None else TRACTION_ROUND_OFF
     slips = moved > min_fraction * max(moved.max(), 1e-300)
     if rule.limit is not None and not rule.starts_at_rest:
         slips[1] = np.abs(tau[1]) >= (1 - TRACTION_ROUND_OFF) * rule.limit

@@ -7,8 +7,8 @@ and then completes the result. The run and its coarse runs are each solved only 
 numerical settings, and `comparisons` the coarser runs from which the errors follow. `scene.rules.methods.ENGINE_SUPPORT`
 lists what each engine can compute, and `runs.plan` the memory of its histories.
 
-Each engine has a module (`march`, `event_to_event` for the engine `hybrid`, `slides` for a bench, and the folder `steady`),
-which prepares the integration in `time_steps` or `hybrid` and contains the measures that the engine computes itself.
-`evaluation` converts a run to a Solution, and `levels` continues a run from drive level to drive level. `joints` makes the
-laws of the engine `hybrid` from the interfaces of a model (`interfaces.joints`).
+Each engine has a module (`march`, `event_to_event` for the engine `event_driven`, `slides` for a bench, and the folder
+`steady`), which prepares the integration in `time_steps` or `event_driven` and contains the measures that the engine
+computes itself. `evaluation` converts a run to a Solution, and `levels` continues a run from drive level to drive level.
+`joints` makes the laws of the engine `event_driven` from the interfaces of a model (`interfaces.joints`).
 """

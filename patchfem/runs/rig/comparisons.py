@@ -10,10 +10,9 @@ from functools import partial
 
 import numpy as np
 
-from ... import slip
+from ... import partial_slip
 from ...effects import law_has_trait
-from ...model.model import Model
-from ...response.errors import (
+from ...measures.errors import (
     CoarserRuns,
     ComparisonRuns,
     compute_absolute_changes,
@@ -24,11 +23,12 @@ from ...response.errors import (
     estimate_sampling_errors,
     second_order_errors,
 )
-from ...response.measures import Values
+from ...measures.measures import Values
+from ...model.model import Model
 from ..bench.engine import Numerics
 from ..interfaces import bond_lists
 from ..patch import faces
-from .engines import ENGINES, divide_steps, enlarge_hybrid_steps, estimate_hybrid_errors
+from .engines import ENGINES, divide_steps, enlarge_event_driven_steps, estimate_event_driven_errors
 from .evaluation import Solution, first_interface_load
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
@@ -43,15 +43,15 @@ COMPARISON_TAIL_FACTOR = 0.1
 def list_time_runs(numerics: Numerics) -> ComparisonRuns:
     """List the comparison runs that are coarser in time than the run with some Numerics.
 
-    Time steps have runs with half and with a quarter of them, and the engine `hybrid` one with larger steps. The solver of
-    steady motions estimates the errors of its steps itself.
+    Time steps have runs with half and with a quarter of them, and the engine `event_driven` one with larger steps. The
+    solver of steady motions estimates the errors of its steps itself.
     """
     engine = ENGINES[numerics.engine]
     if engine.finds_periodic_motion:
         return []
     if not engine.has_steps:
-        rule = partial(estimate_hybrid_errors, rtol=numerics.local)
-        return [CoarserRuns((enlarge_hybrid_steps(numerics),), rule)]
+        rule = partial(estimate_event_driven_errors, rtol=numerics.local)
+        return [CoarserRuns((enlarge_event_driven_steps(numerics),), rule)]
     rule = partial(estimate_convergence_errors, steps=numerics.steps)
     runs = (divide_steps(numerics, 2), divide_steps(numerics, 4))
     return [CoarserRuns(runs, rule, source="steps")]
@@ -129,7 +129,7 @@ def list_space_runs(
         rule = _choose_mesh_rule(interface.patch.gap.side, has_elements=has_elements)
         add("mesh", rule, {"meshed": numbers})
     if n_modes is not None:
-        fewer = slip.shear_modes.comparison_mode_count(n_modes)
+        fewer = partial_slip.shear_modes.comparison_mode_count(n_modes)
         add("modes", second_order_errors, {"shear_modes": fewer})
 
     # The cells of an Iwan model represent its continuous density to order 2.

@@ -5,7 +5,7 @@ due to coarse runs and to the mesh.
 
 As long as no node of either mesh slips, both meshes have the same decay, and both omit the
 dissipation by micro-slip. Therefore the mesh error is computed from static hysteresis loops at the
-same amplitudes (`slip.mesh_correction`).
+same amplitudes (`partial_slip.mesh_correction`).
 """
 
 from dataclasses import replace
@@ -14,16 +14,16 @@ import numpy as np
 
 from ...convergence import MAX_CONVERGENCE_ORDER, convergence_error
 from ...core import NotConverged, PatchfemError
-from ...hybrid import quasi_static
-from ...hybrid.cases import UndrivenRig
-from ...response.decay_curve import (
+from ...event_driven import quasi_static
+from ...event_driven.cases import UndrivenRig
+from ...measures.decay_curve import (
     MIN_HALF_CYCLE_RATIO,
     DecayCurve,
     fit_decay_curve,
     locate_reversals,
     make_half_cycles,
 )
-from ...slip.mesh_correction import spread_elements
+from ...partial_slip.mesh_correction import spread_elements
 from ..patch import faces
 from . import engines, joints
 from .evaluation import Solution
@@ -181,8 +181,8 @@ def estimate_mesh_error(fine, coarse, compute, amplitudes) -> np.ndarray:
 
     The change on a coarser mesh is extrapolated at second order. At a displacement at which no node slips, a coarser mesh
     changes nothing. Therefore the change counts as at least that when the elements are spread over the yield displacements
-    between the nodes (`slip.mesh_correction`). Both changes pass through zero from node to node, so that the error follows
-    from their root mean square at the amplitudes nearby.
+    between the nodes (`partial_slip.mesh_correction`). Both changes pass through zero from node to node, so that the error
+    follows from their root mean square at the amplitudes nearby.
 
     Parameters
     ----------

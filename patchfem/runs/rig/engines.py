@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import hybrid, structure
+from ... import event_driven, structure
 from ...effects import NO_WAVEFORM, law_has_trait
+from ...measures.errors import compute_absolute_changes
+from ...measures.measures import Values
 from ...model.model import Model
-from ...response.errors import compute_absolute_changes
-from ...response.measures import Values
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ..bench import engine as bench_engine
@@ -78,14 +78,14 @@ def divide_steps(numerics, divisor: int):
     return replace(numerics, steps=steps)
 
 
-def enlarge_hybrid_steps(numerics):
-    """Return the settings of the engine `hybrid` with a larger step tolerance and longer steps, for a comparison run."""
-    local = hybrid.runs.COARSE * numerics.local
-    return replace(numerics, local=local, steps=numerics.steps / hybrid.runs.COARSE_STEP)
+def enlarge_event_driven_steps(numerics):
+    """Return settings of the engine `event_driven` for a comparison run: a larger step tolerance and longer steps."""
+    local = event_driven.runs.COARSE * numerics.local
+    return replace(numerics, local=local, steps=numerics.steps / event_driven.runs.COARSE_STEP)
 
 
-def estimate_hybrid_errors(values: Values, coarse_values: Values, rtol: float) -> Values:
-    """Return the errors of the measures that a run of the engine `hybrid` and one with larger steps have in common.
+def estimate_event_driven_errors(values: Values, coarse_values: Values, rtol: float) -> Values:
+    """Return the errors of the measures that a run of the engine `event_driven` and one with larger steps have in common.
 
     Parameters
     ----------
@@ -96,15 +96,15 @@ def estimate_hybrid_errors(values: Values, coarse_values: Values, rtol: float) -
     """
     errors = {}
     for name, change in compute_absolute_changes(values, coarse_values).items():
-        errors[name] = hybrid.runs.estimate_error(change, values[name], rtol)
+        errors[name] = event_driven.runs.estimate_error(change, values[name], rtol)
     return errors
 
 
-HYBRID = Engine("hybrid", "exact")
+EVENT_DRIVEN = Engine("event_driven", "exact")
 MARCH = Engine("march", "march", step_multiple=1)
 HARMONIC = Engine("harmonic", "harmonic", finds_periodic_motion=True)
 BENCH = Engine("bench", "", step_multiple=4)
-ENGINES = {engine.name: engine for engine in (HYBRID, MARCH, HARMONIC, BENCH)}
+ENGINES = {engine.name: engine for engine in (EVENT_DRIVEN, MARCH, HARMONIC, BENCH)}
 
 
 @lru_cache(8)
@@ -121,20 +121,20 @@ def choose_engine(model: Model) -> Engine:
     for engine in ENGINES.values():
         if engine.method == model.accuracy.method:
             return engine
-    if HYBRID.find_unsupported_feature(model):
+    if EVENT_DRIVEN.find_unsupported_feature(model):
         return MARCH
     laws = [law.numbers.law for law in model.rig.friction.interfaces]
     is_rigid = all(law_has_trait(law, "set-valued") for law in laws)
     is_rigid &= not (model.partial_slip or model.rig.friction.has_partial_slip)
     accuracy = model.accuracy
     has_setting = list_fixed_settings(accuracy) or accuracy.quadrature not in ("auto", "recursion")
-    return MARCH if has_setting and not is_rigid and model.grooves is None else HYBRID
+    return MARCH if has_setting and not is_rigid and model.grooves is None else EVENT_DRIVEN
 
 
 def describe_unused_settings(model: Model, engine: str) -> list[str]:
     """Return sentences on the settings in [accuracy] that the engine of a rig does not use."""
     # Steady motions are found by integration from event to event.
-    used = "hybrid" if ENGINES[engine].finds_periodic_motion else engine
+    used = "event_driven" if ENGINES[engine].finds_periodic_motion else engine
     sentences = []
     for key in list_fixed_settings(model.accuracy):
         if not has_effect(key, model.kind, used):
@@ -221,12 +221,12 @@ def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     if not structure.drive_sizes.is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / drive.cycles)))
     local = 0.0
-    if engine is HYBRID:
+    if engine is EVENT_DRIVEN:
         # A rig without friction needs few steps. Otherwise the error per step is a small part of the tolerance.
-        steps = hybrid.cases.MIN_STEPS
+        steps = event_driven.cases.MIN_STEPS
         local = float(np.clip(1e-5 * accuracy.tolerance, MIN_RELATIVE_STEP_ERROR, 1e-8))
         if accuracy.method == "exact" or model.friction is None:
-            local = hybrid.cases.EXACT_RTOL
+            local = event_driven.cases.EXACT_RTOL
     elif engine is MARCH and accuracy.steps_per_cycle is None:
         # The steps are short enough for a unique solution; comparison runs have half and a quarter of them.
         steps = 4 * ceil(max(steps, min_unique_steps(model)) / 4)

@@ -15,13 +15,13 @@ from ...core import Outcome, Response, SineDrive
 from ...cost_model import measure_cpu_time
 from ...effects import law_has_trait
 from ...formatting import format_length
+from ...measures.decay_curve import measure_last_cycle_amplitude
+from ...measures.events import Events, VibratingMode, is_all_stuck
+from ...measures.loops import CycleLoop, choose_reversal_force_rule, sample_loop
+from ...measures.measures import Values, compare_friction_works
+from ...measures.reasons import MAX_OTHER_MODES_FRACTION
+from ...measures.rows import AMPLITUDE, STEADY_AMPLITUDE, LastCycles, compute_measures
 from ...motion_measures import find_extremes
-from ...response.decay_curve import measure_last_cycle_amplitude
-from ...response.events import Events, VibratingMode, is_all_stuck
-from ...response.loops import CycleLoop, choose_reversal_force_rule, sample_loop
-from ...response.measures import Values, compare_friction_works
-from ...response.reasons import MAX_OTHER_MODES_FRACTION
-from ...response.rows import AMPLITUDE, STEADY_AMPLITUDE, LastCycles, compute_measures
 from ..results.result import SteadyData
 from .levels import LevelRuns, run_levels
 
@@ -89,7 +89,7 @@ class Solution:
     - run: run of the engine (`EngineRun` or `time_steps.time_march.Motion`), whose outcome is None if it is determined
       from the cycles.
     - seconds: CPU time of the run [s].
-    - contact: contact points, or laws of the engine `hybrid`.
+    - contact: contact points, or laws of the engine `event_driven`.
     - prepare: CPU time of each part of the preparation [s].
     - run_errors: error estimates by measure from the run itself, without coarse runs.
     - levels: LevelRuns of a drive in levels, or None.
@@ -229,7 +229,7 @@ class RunEvaluator:
     numerics : Numerics
     patch : Patch or None
     contact
-        Contact points, or laws of the engine `hybrid`.
+        Contact points, or laws of the engine `event_driven`.
     stick_tolerance : float
         Largest slip per cycle [m] at which the interface counts as stuck.
 
@@ -319,7 +319,7 @@ class RunEvaluator:
     def make_solution(self, run, seconds: float, drive=None) -> Solution:
         """Evaluate a run and return its Solution.
 
-        Measures follow from the last `numerics.window` cycles (`response.rows`). `run_errors` are the errors that the run
+        Measures follow from the last `numerics.window` cycles (`measures.rows`). `run_errors` are the errors that the run
         itself shows: of sampling, and those of its engine. Errors due to steps and mesh need coarse runs and are not part
         of it.
 

@@ -1,4 +1,4 @@
-"""Runs of a rig from event to event by the engine `hybrid`.
+"""Runs of a rig from event to event by the engine `event_driven`.
 
 In: a Model, its Numerics and its Patch. Out: a Solution whose measures the engine has summed over its steps. The samples of
 the histories are those of the last cycles, of equal distances before them, and of the events.
@@ -13,13 +13,13 @@ import numpy as np
 from ... import friction
 from ...convergence import convergence_error
 from ...core import NotConverged, Outcome, Response
-from ...hybrid import cases
-from ...hybrid import runs as engine
-from ...hybrid.laws import is_rigid, masing
-from ...hybrid.measures import compute_energies
-from ...hybrid.records import Margin, Memory, State, Status
-from ...response.errors import ERROR_MEASURES, compute_absolute_changes
-from ...response.events import (
+from ...event_driven import cases
+from ...event_driven import runs as engine
+from ...event_driven.laws import is_rigid, masing
+from ...event_driven.measures import compute_energies
+from ...event_driven.records import Margin, Memory, State, Status
+from ...measures.errors import ERROR_MEASURES, compute_absolute_changes
+from ...measures.events import (
     SEGMENT_BORDER,
     Events,
     VibratingMode,
@@ -29,8 +29,8 @@ from ...response.events import (
     select_strongest,
     sort_events,
 )
-from ...response.measures import Values
-from ...response.rows import AMPLITUDE, find_definition, select_names
+from ...measures.measures import Values
+from ...measures.rows import AMPLITUDE, find_definition, select_names
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
 from ..bench.masing import find_stretches
@@ -100,7 +100,7 @@ class ElementSnapshot(NamedTuple):
 
 
 class LumpedEvaluator(RunEvaluator):
-    """Evaluator that computes runs of the engine `hybrid`, and measures from them.
+    """Evaluator that computes runs of the engine `event_driven`, and measures from them.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ class LumpedEvaluator(RunEvaluator):
         Parameters
         ----------
         run : EngineRun
-            Run of the engine `hybrid`.
+            Run of the engine `event_driven`.
         drive
             Drive of this run, which may be a single level.
         """

@@ -6,7 +6,7 @@ interface nodes by name.
 
 import numpy as np
 
-from ... import friction, slip
+from ... import friction, partial_slip
 from ...effects import law_has_trait, needs_bond_list
 from ..interfaces import averaged_law, contact_points
 from ..patch import jenkins_elements
@@ -123,7 +123,7 @@ def _make_element_frames(patch, keys, times, states) -> Arrays | None:
     jenkins_set = jenkins_elements.make_elements(patch, static, length).jenkins_set
     if jenkins_set is None:
         return None
-    tau, local = slip.fields.compute_element_fields(patch, jenkins_set, states, length)
+    tau, local = partial_slip.fields.compute_element_fields(patch, jenkins_set, states, length)
     # The tractions of the cells of a face are interpolated, so that they do not reach their limits exactly.
     limit = None if patch.model.area is not None else static * patch.pressure.sigma_n
     slide = np.array([slide for slide, _ in states])

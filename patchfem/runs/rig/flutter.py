@@ -1,7 +1,7 @@
 """Amplitude above which friction does not limit a mode with negative damping.
 
 In: a `rig.CoupledRun` with such a mode. Out: `flutter_amplitude`, the amplitude of the
-largest unstable limit cycle (`hybrid.free_motions`), and notes.
+largest unstable limit cycle (`event_driven.free_motions`), and notes.
 """
 
 from math import tau
@@ -11,11 +11,11 @@ import numpy as np
 
 from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...effects import law_has_trait
+from ...event_driven import free_motions
 from ...formatting import format_length
-from ...hybrid import free_motions
+from ...measures.measures import Measures
+from ...measures.rows import MOTION_TABLE
 from ...model.rig import MAX_COMPUTED_DISPLACEMENT
-from ...response.measures import Measures
-from ...response.rows import MOTION_TABLE
 from .engines import find_obstacle_of_map
 from .evaluation import first_interface_load
 from .joints import make_undriven_rig

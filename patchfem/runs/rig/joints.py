@@ -1,4 +1,4 @@
-"""Interfaces of a rig in the form of the engine `hybrid`.
+"""Interfaces of a rig in the form of the engine `event_driven`.
 
 In: a Model, its Numerics and its Patch. Out: the laws and loads of its interfaces (`make_joints`), and the rig without its
 drive (`make_undriven_rig`).
@@ -12,10 +12,10 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...effects import law_has_trait
-from ...hybrid import laws
-from ...hybrid.cases import Load, UndrivenRig, list_interfaces
-from ...hybrid.laws import grooves, masing
-from ...hybrid.records import LawNumbers
+from ...event_driven import laws
+from ...event_driven.cases import Load, UndrivenRig, list_interfaces
+from ...event_driven.laws import grooves, masing
+from ...event_driven.records import LawNumbers
 from ...model.model import Model
 from ..interfaces import averaged_law, bond_lists
 from ..interfaces.joints import Joint, find_climbed_grooves, list_parts
@@ -32,7 +32,7 @@ MAX_STUCK_SLIP_RATIO = 1e-3  # largest slip per cycle of an interface that count
 
 
 def make_law(joint: Joint) -> LawNumbers:
-    """Return the law of an interface as LawNumbers, the form for the engine `hybrid`."""
+    """Return the law of an interface as LawNumbers, the form for the engine `event_driven`."""
     elements = joint.elements
     if elements is not None:
         return masing.from_elements(elements.stiffness, elements.yield_displacement)
@@ -51,7 +51,7 @@ def make_load(joint: Joint) -> Load:
 
 
 class Joints(NamedTuple):
-    """Interfaces of a rig for the engine `hybrid`.
+    """Interfaces of a rig for the engine `event_driven`.
 
     - laws: (LawNumbers, Load) of each interface.
     - elements: stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface, or () without partial
@@ -85,7 +85,7 @@ class Joints(NamedTuple):
 
 
 def make_joints(model: Model, numerics, patch) -> Joints:
-    """Return laws and loads of all interfaces of a rig for the engine `hybrid`.
+    """Return laws and loads of all interfaces of a rig for the engine `event_driven`.
 
     Parameters
     ----------

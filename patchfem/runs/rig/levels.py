@@ -14,8 +14,8 @@ import numpy as np
 from ... import structure
 from ...convergence import MAX_CONVERGENCE_ORDER, convergence_error
 from ...core import Measure, Response, SineDrive
-from ...response.errors import estimate_errors, split_errors
-from ...response.events import (
+from ...measures.errors import estimate_errors, split_errors
+from ...measures.events import (
     LEVEL_MEASURES,
     Level,
     bracket_onset,
@@ -23,7 +23,7 @@ from ...response.events import (
     make_no_onset_reason,
     make_onset_test,
 )
-from ...response.rows import MOTION_TABLE
+from ...measures.rows import MOTION_TABLE
 
 # Relative error of the measures of an event-driven run, which has round-off only
 EXACT_RELATIVE_ERROR = 1e-9

@@ -10,7 +10,7 @@ from time import process_time
 import numpy as np
 
 from ...core import Outcome, add_interface_number
-from ...response.measures import Values, bound_sampling_errors, compute_step_harmonic
+from ...measures.measures import Values, bound_sampling_errors, compute_step_harmonic
 from ...structure.drive_sizes import estimate_peak_speed, find_drive_omega
 from ...time_steps import time_march as engine
 from ..interfaces import bands

@@ -15,15 +15,15 @@ from ... import structure
 from ...core import NotConverged, Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length, format_number, format_quantity
-from ...model import structure as model_structure
-from ...motion_measures import MAX_RESTING_SLIDE_RANGE
-from ...response.outcome import (
+from ...measures.outcome import (
     OPEN_LOOP_MESSAGE,
     describe_ringing,
     find_ringing,
     note_on_changing_drive,
 )
-from ...response.rows import AMPLITUDE
+from ...measures.rows import AMPLITUDE
+from ...model import structure as model_structure
+from ...motion_measures import MAX_RESTING_SLIDE_RANGE
 from ..bench import bench
 from ..interfaces import joints
 from ..results.interfaces import Face, merge_sentences, warn_of_large_slide

@@ -8,11 +8,11 @@ from math import inf, pi
 
 import numpy as np
 
-from ... import slip
+from ... import partial_slip
 from ...core import add_interface_number, remove_interface_number
 from ...effects import law_has_trait
+from ...measures.measures import Values
 from ...model.model import Model
-from ...response.measures import Values
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ..interfaces import bond_lists
 from .engines import choose_numerics
@@ -96,7 +96,7 @@ def count_unknowns(model: Model) -> dict[str, int]:
     has_bonds = model.grooves is None and law_has_trait(f.law, "bonds")
     is_changed = has_bonds or model.grooves is not None or model.rig.friction.load_varies
     if is_changed and not (has_bonds and bond_lists.has_bond_list(model)):
-        counts["shear_modes"] = numerics.shear_modes or slip.shear_modes.N_SHEAR_MODES
+        counts["shear_modes"] = numerics.shear_modes or partial_slip.shear_modes.N_SHEAR_MODES
     return counts
 
 

@@ -10,13 +10,12 @@ from math import ceil, floor, log, log2
 
 import numpy as np
 
-from ... import compiled, structure
+from ... import kernel_cache, structure
 from ...convergence import convergence_error
 from ...core import Measure, NotConverged, Outcome, PatchfemError, max_abs
-from ...model import rig as model_rig
-from ...response import reasons, stationary
-from ...response.decay_curve import DecayCurve
-from ...response.errors import (
+from ...measures import reasons, stationary
+from ...measures.decay_curve import DecayCurve
+from ...measures.errors import (
     ComparisonRuns,
     SourceErrors,
     StepRun,
@@ -25,10 +24,11 @@ from ...response.errors import (
     estimate_errors,
     list_step_runs,
 )
-from ...response.measures import Measures
-from ...response.outcome import judge_outcome, remove_errors
-from ...response.rows import set_final_floors
-from ...response.settling import find_slip_period
+from ...measures.measures import Measures
+from ...measures.outcome import judge_outcome, remove_errors
+from ...measures.rows import set_final_floors
+from ...measures.settling import find_slip_period
+from ...model import rig as model_rig
 from .. import refine
 from ..bench import bench
 from ..bench import engine as bench_engine
@@ -38,7 +38,7 @@ from ..results.interfaces import check_pieces_overlap
 from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, Settings, Shortage
 from . import comparisons, decays, event_to_event, flutter, levels, march, slides
 from . import fields as interface_fields
-from .engines import ENGINES, HYBRID, MARCH, MAX_MARCH_STEPS_PER_CYCLE, choose_numerics
+from .engines import ENGINES, EVENT_DRIVEN, MARCH, MAX_MARCH_STEPS_PER_CYCLE, choose_numerics
 from .evaluation import Solution, first_interface_load, replace_output_by_gauge
 from .motion_warnings import collect_remarks
 from .steady import shooting
@@ -79,8 +79,8 @@ def solve_rig(model, numerics, patch, n_frames: int = 0, say=None, progress=None
     if numerics.engine == "harmonic":
         solution = shooting.solve_steady_motion(model, numerics, patch, n_frames, say)
         return replace_output_by_gauge(model, solution)
-    if numerics.engine == "hybrid":
-        compiled.report_compilation_to(say)
+    if numerics.engine == "event_driven":
+        kernel_cache.report_compilation_to(say)
         evaluator = event_to_event.LumpedEvaluator(model, numerics, patch)
     else:
         evaluator = march.MarchEvaluator(model, numerics, patch, say)
@@ -156,7 +156,7 @@ class Runner:
         return solution
 
     def estimate_errors(self, runs: ComparisonRuns, solution: Solution) -> list[SourceErrors]:
-        """Estimate the errors of a run from coarse runs (`response.errors.estimate_errors`)."""
+        """Estimate the errors of a run from coarse runs (`measures.errors.estimate_errors`)."""
 
         def solve(numerics: Numerics) -> Solution:
             """Solve a coarse run; the decay curve needs histories from its start."""
@@ -288,7 +288,7 @@ def run_motion(inputs: RunInputs) -> Result:
         run, shortage = run_refined(inputs, numerics)
     except NotConverged as error:
         # A law or a mode may be too fast to be followed from event to event.
-        is_chosen = model.accuracy.method == "auto" and numerics.engine == HYBRID.name
+        is_chosen = model.accuracy.method == "auto" and numerics.engine == EVENT_DRIVEN.name
         if not is_chosen or MARCH.find_unsupported_feature(model):
             raise
         obstacle = str(error).partition(";")[0]
@@ -544,7 +544,7 @@ def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:
     measures = set_final_floors(complete_measures(run).measures, accuracy.tolerance)
     if work > MAX_NODE_STEPS_FOR_OTHER_MEASURES:
         measures = {name: one for name, one in measures.items() if refine.is_main(name)}
-    # The engine `hybrid` estimates the error of its steps itself.
+    # The engine `event_driven` estimates the error of its steps itself.
     axis = "own" if numerics.local else "steps"
     excess = refine.find_worst_measure(measures, accuracy.tolerance, [axis]).excess
     has_stalled = len(excesses) > 1 and excess >= excesses[-2]

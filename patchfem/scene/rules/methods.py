@@ -98,12 +98,10 @@ class EngineSupport(NamedTuple):
     features: str
 
 
-# Laws of the engine `hybrid` under a load that varies in time.
-VARYING_LAWS = ("coulomb", "tanh", "elastic-plastic")
 # Features that each engine of a rig supports; `runs.rig.engines` refers to these names. The rows "exact" and "piecewise"
 # are the maps of a period by which a steady motion is found.
 ENGINE_SUPPORT = {
-    "hybrid": EngineSupport("events", "no-law yaw faces levels parts spring load grooves"),
+    "event_driven": EngineSupport("events", "no-law yaw faces levels parts spring load grooves"),
     "exact": EngineSupport("exact", "no-law yaw faces"),
     "piecewise": EngineSupport("pieces", "parts faces"),
     "march": EngineSupport(
@@ -171,7 +169,7 @@ def has_shear_elements(joint: Joint) -> bool:
 
 
 def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
-    """Return whether the engine `hybrid` has the law of an interface (`joint`).
+    """Return whether the engine `event_driven` has the law of an interface (`joint`).
 
     `motion` tells what the scene has beside: grooves, a varying load, a shaped lower piece. The engine needs a state
     of a fixed number of values.
@@ -186,7 +184,8 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     if motion.load_change:
         # Regimes of the elastic-plastic law have springs that come and go with the load.
         is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)
-        return law in VARYING_LAWS and not is_fixed
+        # Laws of the engine `event_driven` under a load that varies in time.
+        return law in ("coulomb", "tanh", "elastic-plastic") and not is_fixed
     return not (motion.lower_shape or joint.is_uneven)
 
 
@@ -349,7 +348,7 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
         return _find_harmonic_obstacle(motion, limits)
 
     # What each engine lacks.
-    by_events = limits["hybrid"]
+    by_events = limits["event_driven"]
     in_steps = limits["march"]
     without_events = f"the motion cannot be computed from event to event {by_events}"
     law = motion.joints[0].law.law if motion.joints else None
@@ -389,13 +388,13 @@ def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> s
             "drive.displacement"
         )
 
-    # Method harmonic computes a period with the engine hybrid, so that it has the limits of this engine too.
+    # Method harmonic computes a period with the engine event_driven, so that it has the limits of this engine too.
     feature = limits["harmonic"]
-    if not feature and limits["hybrid"]:
-        feature = limits["hybrid"]
+    if not feature and limits["event_driven"]:
+        feature = limits["event_driven"]
         if motion.grooves:
             feature = f"with {motion.grooves} {feature}"
-        joint = _find_unsupported_joint(ENGINE_SUPPORT["hybrid"], motion)
+        joint = _find_unsupported_joint(ENGINE_SUPPORT["event_driven"], motion)
         if joint is not None and not (motion.grooves or law_supports(joint.law, "harmonic")):
             remedy = f"use 'march', or {suggest_laws('harmonic', friction=joint.law)}"
             return describe_unsupported(f"'harmonic' with {describe_law(joint.law)}", remedy)

@@ -117,7 +117,7 @@ def friction_rows(tmp_path_factory):
                     RUBS, sets=[*sets, f"drive.frequency={f} Hz", f"drive.acceleration={level} g"]
                 )
             )
-            assert str(one.outcome) in ("steady", "stuck") and one.settings.engine == "hybrid"
+            assert str(one.outcome) in ("steady", "stuck") and one.settings.engine == "event_driven"
             out.append(
                 (
                     f,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from command_line import run_successfully
 
-from patchfem.response import DecayCurve
+from patchfem.measures import DecayCurve
 
 MODE = """\
 [structure]

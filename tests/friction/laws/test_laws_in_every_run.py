@@ -50,21 +50,21 @@ def test_exact_march_agrees_with_harmonic_balance(law):
 @pytest.mark.share(0)
 @pytest.mark.parametrize("extra_keys", ["", "initial_bonds = 0.0\n"])
 def test_exact_released_bonds_agree_in_both_engines(extra_keys):
-    """Displacement and slip after a release agree between the march and the engine `hybrid` within 5 nm.
+    """Displacement and slip after a release agree between the march and the engine `event_driven` within 5 nm.
 
     Slip is the relative displacement less the stretch of the bonds, which is zero at the start.
     """
-    hybrid = run_release(BONDS + extra_keys)
+    event_driven = run_release(BONDS + extra_keys)
     marched = run_release(
         BONDS + extra_keys, "accuracy.method=march", "accuracy.steps_per_cycle=800"
     )
-    for run in (hybrid, marched):
+    for run in (event_driven, marched):
         assert run.slide[0] == run.slip[0] == 60e-6
         # displacement and slip differ by the stretch of the bonds
         assert np.abs(run.slide - run.slip).max() <= 10e-6
     for name in ("slide", "slip"):
-        interpolated = CubicSpline(marched.time, getattr(marched, name))(hybrid.time)
-        assert getattr(hybrid, name) == pytest.approx(interpolated, abs=5e-9), name
+        interpolated = CubicSpline(marched.time, getattr(marched, name))(event_driven.time)
+        assert getattr(event_driven, name) == pytest.approx(interpolated, abs=5e-9), name
 
 
 @pytest.mark.parametrize(

@@ -43,8 +43,8 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "runs.rig.engines.MAX_MARCH_STEPS_PER_CYCLE": (
         "steps per cycle of a time integration, if the tolerance determines the steps"
     ),
-    "hybrid.cases.MAX_STEPS": "steps of a motion from event to event, with method `exact` or by engine `hybrid`, beside "
-    "100 in each cycle",
+    "event_driven.cases.MAX_STEPS": "steps of a motion from event to event, by method `exact` or engine `event_driven`, "
+    "beside 100 in each cycle",
     "structure.drive_sizes.MAX_STORED_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
     "least 20 per cycle; of a longer release turning points and the last cycles",
     "structure.drive_sizes.MAX_EARLY_SAMPLES": "number of samples stored before the last cycles; longer records are "

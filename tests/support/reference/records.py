@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from patchfem.export import quantities
 from patchfem.export import surface_definitions as definitions
-from patchfem.response.rows import MOTION_MEASURE_ROWS as MOTION
+from patchfem.measures.rows import MOTION_MEASURE_ROWS as MOTION
 from patchfem.runs.results.patch_rows import PATCH_TABLE
 from patchfem.scene import MATERIALS
 

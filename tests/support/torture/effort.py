@@ -5,7 +5,7 @@ from patchfem.runs.interfaces.bond_lists import has_bond_list, is_stuck_by_print
 
 NODE_SECONDS = 4e-5  # CPU time [s] per elastic unknown of the finest mesh
 LIST_STRIP_STEP_SECONDS = 2e-6  # CPU time [s] per time step and strip of a list of bonds
-HYBRID_CYCLE_SECONDS = 1e-3  # CPU time [s] of a cycle from event to event
+EVENT_DRIVEN_CYCLE_SECONDS = 1e-3  # CPU time [s] of a cycle from event to event
 STEP_SECONDS = 1.5e-6  # CPU time [s] of a time step of a point
 POINT_STEP_SECONDS = 2e-7  # additional CPU time [s] of a time step per node of the interface
 N_JUMPS = 40  # jumps of wear if the run chooses their number
@@ -22,8 +22,8 @@ def estimate_seconds(plan) -> float:
     seconds = 0.5 + NODE_SECONDS * unknowns.get("elastic_unknowns_about", 0)
     n_points = max(unknowns.get("interface_points", 0), unknowns.get("bond_list_about", 0))
     motion = 0.0
-    if plan.engine == "hybrid":
-        motion = HYBRID_CYCLE_SECONDS * model.rig.drive.cycles
+    if plan.engine == "event_driven":
+        motion = EVENT_DRIVEN_CYCLE_SECONDS * model.rig.drive.cycles
     elif plan.engine == "harmonic":
         motion = 2.0
     elif model.rig is not None:

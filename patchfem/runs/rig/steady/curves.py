@@ -11,8 +11,8 @@ import numpy as np
 
 from ....core import Response, SineDrive
 from ....formatting import format_quantity
-from ....response.measures import Values
-from ....response.rows import AMPLITUDE
+from ....measures.measures import Values
+from ....measures.rows import AMPLITUDE
 from ...results.patch_rows import Arrays
 from ..levels import EXACT_RELATIVE_ERROR
 

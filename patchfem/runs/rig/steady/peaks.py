@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core import Measure, NotConverged, max_abs
-from ....response.errors import compute_absolute_changes
-from ....response.rows import AMPLITUDE
+from ....measures.errors import compute_absolute_changes
+from ....measures.rows import AMPLITUDE
 from ...results.patch_rows import Arrays
 from ..evaluation import Solution, replace_output_by_gauge
 from .curves import (

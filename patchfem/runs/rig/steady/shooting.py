@@ -1,8 +1,8 @@
-"""Steady motion of a rig by shooting with the map of a period of the engine `hybrid`.
+"""Steady motion of a rig by shooting with the map of a period of the engine `event_driven`.
 
-In: a Model, its Numerics and its Patch. Out: the Solution under a sine (`hybrid.periodic`) with its regime, Floquet
+In: a Model, its Numerics and its Patch. Out: the Solution under a sine (`event_driven.periodic`) with its regime, Floquet
 multipliers and stability, and the largest motion of a response curve over frequency, by continuation through its folds
-where it may have some (`hybrid.periodic_curves`).
+where it may have some (`event_driven.periodic_curves`).
 """
 
 from collections.abc import Callable
@@ -12,24 +12,24 @@ from time import process_time
 
 import numpy as np
 
-from .... import compiled
+from .... import kernel_cache
 from ....core import NotConverged, Outcome, PatchfemError, SineDrive, max_abs
-from ....formatting import format_length
-from ....hybrid import cases, harmonic_balance, periodic
-from ....hybrid.laws import is_rigid, masing
-from ....hybrid.periodic_curves import (
+from ....event_driven import cases, harmonic_balance, periodic
+from ....event_driven.laws import is_rigid, masing
+from ....event_driven.periodic_curves import (
     MotionCurve,
     PathPoint,
     PathSettings,
     measure_distance,
 )
-from ....hybrid.records import Face, Probe, Setting, Status, Window
-from ....response.measures import Values
-from ....response.rows import AMPLITUDE, select_names
-from ....response.spectrum import make_acceleration_measures
+from ....event_driven.records import Face, Probe, Setting, Status, Window
+from ....formatting import format_length
+from ....measures.measures import Values
+from ....measures.rows import AMPLITUDE, select_names
+from ....measures.spectrum import make_acceleration_measures
 from ....structure.response import compute_receptance
 from ...results.result import SteadyData
-from ..engines import enlarge_hybrid_steps, estimate_hybrid_errors, may_fold
+from ..engines import enlarge_event_driven_steps, estimate_event_driven_errors, may_fold
 from ..evaluation import Solution, SteadyPart
 from ..event_to_event import LumpedEvaluator
 from ..joints import make_joints
@@ -80,7 +80,7 @@ class ShootingFinder:
             numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
         )
         self.draws_curve = numerics.whole
-        compiled.report_compilation_to(say)
+        kernel_cache.report_compilation_to(say)
         self.joints = make_joints(model, self.numerics, patch)
         self.may_fold = may_fold(model)
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
@@ -200,11 +200,11 @@ class ShootingFinder:
 
         # The errors are those of the steps, which a run with larger ones shows, and of the fixed point.
         coarse = LumpedEvaluator(
-            self.model, enlarge_hybrid_steps(self.numerics), self.patch, self.joints
+            self.model, enlarge_event_driven_steps(self.numerics), self.patch, self.joints
         )
         coarse_run = coarse.resume(drive, run.cycles_done, state, 0)
         coarse_values = coarse.evaluate_measures(coarse_run, drive)
-        step_errors = estimate_hybrid_errors(values, coarse_values, RTOL)
+        step_errors = estimate_event_driven_errors(values, coarse_values, RTOL)
         relative = find_relative_error(motion)
         errors = {}
         for name, value in values.items():
