@@ -18,7 +18,12 @@ from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds.parameters import Bonds
 from ...friction.record import make_law
 from ...measures import rows
-from ...measures.errors import ERROR_MEASURES, combine_errors, estimate_convergence_errors
+from ...measures.errors import (
+    ERROR_MEASURES,
+    combine_errors,
+    estimate_convergence_errors,
+    include_phase_error,
+)
 from ...measures.outcome import (
     AMPLITUDE_ROUND_OFF,
     describe_ringing,
@@ -370,7 +375,7 @@ def estimate_errors(
         for name, error in errors.items():
             left_out = march.repeat if name == DRIFT else repeat_error
             errors[name] = combine_errors(name, fine, [error], left_out)
-        return errors
+        return include_phase_error(errors)
 
 
 def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarray]:
@@ -410,7 +415,7 @@ def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarra
     with np.errstate(all="ignore"):
         ratio = np.abs(values["equivalent_damping"] / values["loop_area"])
         errors["equivalent_damping"] += ratio * work
-    return errors
+    return include_phase_error(errors)
 
 
 def has_closed_form(group: Group) -> np.ndarray:
