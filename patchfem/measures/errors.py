@@ -34,10 +34,6 @@ from .rows import (
     select_names,
 )
 
-LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
-# Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples per cycle.
-INSTANT_SAMPLING_ERROR = 0.005
-MOTION_SAMPLING_ERROR = 1e-9  # Relative error of all other measures, which are interpolated.
 # Measures that are errors of the solution, so that their own error is their value.
 ERROR_MEASURES = select_names("error")
 PHASE_MEASURES = select_names("phase")  # Angles modulo pi.
@@ -137,11 +133,15 @@ def estimate_sampling_errors(values: Values) -> Values:
     for name, value in values.items():
         definition = find_definition(name)
         if definition.has("loop"):
-            errors[name] = LOOP_SAMPLING_ERROR * abs(value)
+            # Relative error of loop measures from 400 samples per cycle.
+            errors[name] = 1e-4 * abs(value)
         elif definition.sample_error:
-            errors[name] = INSTANT_SAMPLING_ERROR
+            # Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples
+            # per cycle.
+            errors[name] = 0.005
         else:
-            errors[name] = MOTION_SAMPLING_ERROR * abs(value)
+            # Relative error of all other measures, which are interpolated.
+            errors[name] = 1e-9 * abs(value)
     return errors
 
 

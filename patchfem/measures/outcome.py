@@ -30,7 +30,6 @@ OPEN_LOOP_MESSAGE = "the friction loop of the last cycle does not close"
 # Safety factor for the proposed number of cycles of a decay, because the last amplitudes may
 # contain a beat.
 PROPOSED_CYCLES_SAFETY_FACTOR = 1.5
-MAX_PROPOSED_CYCLES = 1e6  # Largest number of cycles that a message proposes.
 # Round-off error of an amplitude, relative to the displacement a/omega^2 of the drive.
 AMPLITUDE_ROUND_OFF = 1e-12
 
@@ -353,7 +352,8 @@ def describe_ringing(ratio: float, limits: tuple[float, float], cycles: float) -
     ratio = max(ratio, np.exp(-max(decay, 0.0) * cycles))
     more_cycles = np.log(ratio / tolerance) / decay if decay > 0 else np.inf
     advice = 'set accuracy.method = "harmonic" for the steady motion'
-    if more_cycles < MAX_PROPOSED_CYCLES:
+    # Largest number of cycles that a message proposes.
+    if more_cycles < 1e6:
         proposed = float(f"{cycles + PROPOSED_CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
         advice = f"set drive.cycles = {proposed:g}"
     return (
