@@ -70,9 +70,24 @@ def find_start(force, move, load, middle):
 
 @njit(**NJIT_CALL)
 def slide_bouc_wen(numbers, memory, trial, values, count, step):
-    """Slide a block of points of the Bouc-Wen law; the package describes the arguments (`time_steps`).
+    """Slide a block of points of the Bouc-Wen law.
 
     Rows of `numbers`: coefficient of friction, length [m], exponent, shape. Memory: y [N], load of the springs [N].
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
     """
     for j in range(count):
         friction = numbers[j]

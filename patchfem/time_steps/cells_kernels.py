@@ -129,7 +129,23 @@ def move_cell(force, springs, softness, is_fixed, slide, loads):
 
 @njit(**NJIT_CALL)
 def slide_cells(numbers, memory, trial, values, count, step):
-    """Slide a block of points of one cell each; the package describes the arguments (`time_steps`)."""
+    """Slide a block of points of one cell each, whose rows are those of `CellRow`.
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
+    """
     n_lanes = (count + VECTOR - 1) // VECTOR * VECTOR
     for j in range(n_lanes):
         friction = numbers[CellRow.FRICTION + j]
@@ -160,10 +176,25 @@ def slide_cells(numbers, memory, trial, values, count, step):
 
 @njit(**NJIT_CALL)
 def slide_sliders(numbers, memory, trial, values, count, step):
-    """Slide a block of points of many cells each; the package describes the arguments (`time_steps`).
+    """Slide a block of points of many cells each, whose entries are those of `SliderRow`.
 
     The loops run over the cells of a point, whose memory is contiguous. A constant load, whose springs are all there, takes
     two thirds of the time of one that changes.
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
     """
     n_cells = int(numbers[SliderRow.COUNT])
     weights = SliderRow.CELLS
