@@ -270,6 +270,8 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     """Choose the engine of a run, and count its unknowns, without solving anything.
 
+    The plan of a scene with a table [sweep] is that of its first case.
+
     Parameters
     ----------
     scene : path, str, dict, Scene or Model
@@ -296,7 +298,9 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     >>> plan.kind, plan.unknowns["modes"]
     ('rig', 1)
     """
-    return plan_model(build(scene, **sets))
+    if isinstance(scene, Model):
+        return plan_model(build(scene, **sets))
+    return plan_model(load(scene, **sets))
 
 
 @_make_verb

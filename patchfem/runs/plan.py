@@ -8,7 +8,8 @@ the memory of the run (`list_memory_parts`), and refuses a run that needs more t
 import mmap
 from collections.abc import Callable
 from contextlib import suppress
-from math import inf
+from dataclasses import replace
+from math import inf, prod
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from ..effects import EFFECTS, law_has_trait
 from ..model.model import Model, build
 from ..model.source import locate_errors, name_key
 from ..scene import refuse_attribute
+from ..scene.overrides import BaseScene
 from . import joint, refine
 from .bench import engine as of_bench
 from .interfaces import bond_lists
@@ -131,7 +133,7 @@ class Plan:
 
 
 def plan(source) -> Plan:
-    """Plan the run of a Scene or a Model.
+    """Plan the run of a Scene or a Model, or the first case of a Scene with a table [sweep].
 
     Parameters
     ----------
@@ -143,9 +145,18 @@ def plan(source) -> Plan:
     PatchfemError
         If the scene cannot be run, with the position of the error in the scene.
     """
-    model = source if isinstance(source, Model) else build(source)
-    with locate_errors(model.source):
-        return _make_plan(model)
+    if isinstance(source, Model):
+        with locate_errors(source.source):
+            return _make_plan(source)
+    if not source.sweep:
+        return plan(build(source))
+
+    # A key that only [sweep] names has its first value in each scene of the file; others get theirs.
+    first = [f"{axis.key}={axis.texts[0]}" for axis in source.sweep]
+    count = prod(len(axis.texts) for axis in source.sweep)
+    case = plan(build(BaseScene(source).override(first)))
+    sentence = f"this is the first of {count} cases of [sweep], {', '.join(first)}; `--set` of its keys chooses another one"
+    return replace(case, verdict=(sentence, *case.verdict))
 
 
 def _make_plan(model: Model) -> Plan:

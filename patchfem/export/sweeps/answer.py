@@ -129,7 +129,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
         )
 
     for name, low, high, _ in analysis.ranges[:MAX_MEASURE_RANGES]:
-        column = table.measures[name]
+        column = table.select_trusted(name)
         for word, case in (("smallest", low), ("largest", high)):
             quantities[f"{word}_{name}"] = Quantity(
                 column.values[case],
