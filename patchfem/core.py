@@ -52,8 +52,6 @@ __all__ = [
 
 G_N = 9.80665  # standard gravity [m s-2]
 MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness of a friction law refers
-# relative round-off of squared frequencies, allowed for in the rule that a spring lowers no frequency
-_STIFFENING_ROUND_OFF = 1e-9
 # lower limit of the overlap of two mode shapes, which keeps its logarithm finite
 _ZERO_OVERLAP = 1e-30
 # assignment cost of a forbidden pair of modes, larger than that of any allowed assignment
@@ -272,7 +270,9 @@ class ModalBasis:
         values, vectors = np.linalg.eigh(
             np.diag(self.omega**2) + rows.T * stiffness @ rows / self.mass
         )
-        lower = (1 - _STIFFENING_ROUND_OFF) * self.omega**2
+        # Relative round-off of squared frequencies, allowed for in the rule that a spring lowers no
+        # frequency
+        lower = (1 - 1e-9) * self.omega**2
         k = _assign_modes(lower, values, np.abs(vectors))[number]
         omega = float(np.sqrt(max(values[k], 0.0)))
         return StuckMode(omega, vectors[:, k] / vectors[number, k])

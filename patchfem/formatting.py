@@ -12,7 +12,6 @@ from math import isfinite, log10
 
 DisplayUnit = tuple[str, float]  # name of a unit, and number of these in one SI unit
 MAX_SIGNIFICANT_DIGITS = 7  # largest number of significant digits of a value
-DIGITS_WITHOUT_ERROR = 6  # number of significant digits of a value without a known error
 MIN_PLAIN_POWER = -4  # smallest power of ten of a number without an exponent
 FIRST_EXPONENT_POWER = 7  # smallest power of ten of a large number with an exponent
 ZERO_ERROR_POWER = -400  # power of ten of a vanishing error, smaller than that of any float
@@ -118,7 +117,8 @@ def round_to_error(
     if abs(value) <= floor:
         return "0", format_number(error, 2) if error is not None and 0 < floor <= error else ""
     if error is None or not isfinite(error):
-        return format_number(value, DIGITS_WITHOUT_ERROR), "" if error is None else f"{error:g}"
+        # Number of significant digits of a value without a known error
+        return format_number(value, 6), "" if error is None else f"{error:g}"
     if value == 0:
         return "0", format_number(error, 2) if error else ""
 

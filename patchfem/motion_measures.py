@@ -13,7 +13,6 @@ MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which there is no distor
 MAX_RESTING_SLIDE_RANGE = 1e-15  # largest range of the slide [m] of an interface at rest
 # Smallest mean resultant length of the doubled phases of slip starts that are one phase.
 MIN_ALIGNMENT = 0.95
-STEP_FRACTION_TOL = 1e-9  # round-off of a fraction of a step
 MIN_ENERGY_DIFFERENCE = 1e-18  # smallest significant difference of energies [J]
 
 # Values by name, each a number or an array (...) with a value for each run
@@ -220,7 +219,8 @@ def find_reversal_steps(time, position, rate) -> StepReversals:
     with np.errstate(divide="ignore", invalid="ignore"):
         first = p / scaled_root
         second = scaled_root / (3 * cubic)
-    is_first = np.abs(first - 0.5) <= 0.5 + STEP_FRACTION_TOL
+    # Round-off of a fraction of a step
+    is_first = np.abs(first - 0.5) <= 0.5 + 1e-9
     s = np.clip(np.where(is_first, first, second), 0.0, 1.0)
     height = slopes[k] * s * (p + s * (quadratic + s * cubic))
     return StepReversals(k, s, position[k] + height)

@@ -150,7 +150,7 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
     ),
     "check": (rig_without_files(), ("check", "SCENE"), "", HEAVY),
     "check of measured rows": ("", ("check", str(RIG)), "", HEAVY),
-    "help": ("", ("--help",), "scene.lines", HEAVY + " pydantic"),
+    "help": ("", ("--help",), "scene.keys.lines", HEAVY + " pydantic"),
     "sweep": (
         BENCH,
         ("sweep", "SCENE", "--over", "friction.static=0.1,0.2", "-o", "OUT", "-q"),

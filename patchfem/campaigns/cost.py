@@ -30,11 +30,8 @@ from .numerical_settings import (
     make_setting_values,
 )
 
-MIN_RUNS_PER_CURVE = 3  # smallest number of runs of a curve over a setting
 # Number of timings of a short run; the shortest one is used, because disturbances only add time.
 N_TIMINGS = 3
-# Smallest CPU time [s] of a run that is timed only once; longer runs scatter by a few percent.
-MIN_SECONDS_TIMED_ONCE = 0.3
 
 
 class Judgement(StrEnum):
@@ -161,7 +158,8 @@ def compute_setting_costs(
                 "",
             )
         runs = _time_settings(make_setting_values(model, setting_name), say)
-    if not runs or (len(runs) < MIN_RUNS_PER_CURVE and setting_name != TOLERANCE_SETTING):
+    # Smallest number of runs of a curve over a setting
+    if not runs or (len(runs) < 3 and setting_name != TOLERANCE_SETTING):
         raise NotConverged(
             f"cost --over {setting_name}: runs with only {len(runs)} values of it succeeded"
         )
@@ -190,7 +188,9 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
                 break
             timings.append((_measure_cpu_time() - begin[0], perf_counter() - begin[1]))
             has_compiled = kernel_cache.COMPILE_SECONDS[0] > compile_seconds
-            is_short = has_compiled or timings[-1][0] < MIN_SECONDS_TIMED_ONCE
+            # Smallest CPU time [s] of a run that is timed only once; longer runs scatter by a few
+            # percent.
+            is_short = has_compiled or timings[-1][0] < 0.3
 
         if result is None:
             continue

@@ -9,7 +9,7 @@ from ..model.model import Model, build
 from ..runs.patch import mesh_levels
 from ..runs.patch.press import solve_patch_contact
 from ..scene.assignments import BOUNDS_FORM, Range, read_assignments
-from ..scene.lines import find_scene_value
+from ..scene.keys.lines import find_scene_value
 from ..scene.overrides import BaseScene
 from ..scene.scene import Scene, SceneError, add_sets
 

@@ -33,8 +33,6 @@ SCENE_KEYS = {
 COUNT_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 # Factors by which the number of cells of a uniform mesh is varied
 CELL_COUNT_FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0)
-CELL_COUNT_LIMITS = (8, 1600)  # numbers of cells of a uniform mesh along the interface
-DEFAULT_CELLS = 128  # middle number of cells along the longer side of a face
 DEFAULT_MIDDLE_COUNT = 8  # middle value of a count that the scene does not set
 # Name of the accuracy of all settings together, which a curve may vary in place of a single one.
 TOLERANCE_SETTING = "tolerance"
@@ -93,7 +91,8 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
     elif name == "element_size":
         length = model.patch.pieces.length
         cells = round(length / model.patch.uniform_element_size)
-        counts = _scale_count(cells, CELL_COUNT_FACTORS, CELL_COUNT_LIMITS)
+        # Numbers of cells of a uniform mesh along the interface
+        counts = _scale_count(cells, CELL_COUNT_FACTORS, (8, 1600))
         values = [length / count for count in counts]
     else:
         values = _scale_count(_find_count(model, name), COUNT_FACTORS, COUNT_LIMITS[name])
@@ -143,7 +142,8 @@ def _find_count(model: Model, name: str) -> int:
             return engine.steps_per_cycle(model)
         return engines.choose_numerics(model).steps
     if name == "cells":
-        return model.patch.area.cells or DEFAULT_CELLS
+        # Middle number of cells along the longer side of a face
+        return model.patch.area.cells or 128
     return getattr(model.wear if name == "jumps" else model.accuracy, name) or DEFAULT_MIDDLE_COUNT
 
 

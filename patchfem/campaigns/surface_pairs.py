@@ -8,8 +8,6 @@ from ..core import PatchfemError
 from ..inputs.tables import TableFormat, find_factors, read_text
 
 REQUIRED_COLUMNS = ("before", "after")  # files of a pair; the other columns are optional
-# Possible cells of the column `direction`, "" if it is not known
-DIRECTION_CELLS = ("", "x", "y")
 
 
 class TableLine(NamedTuple):
@@ -65,7 +63,8 @@ def read_pairs(table: Path) -> list[TableLine]:
         if not all(names):
             column = REQUIRED_COLUMNS[names.index("")]
             raise PatchfemError(f"{path}:{number}: {column}: the name of a file is needed")
-        if direction not in DIRECTION_CELLS:
+        # Possible cells of the column `direction`, "" if it is not known
+        if direction not in ("", "x", "y"):
             raise PatchfemError(
                 f"{path}:{number}: direction: must be x, y or empty, not '{direction[:40]}'"
             )

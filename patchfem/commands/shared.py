@@ -16,8 +16,8 @@ from ..export import folder as folders
 from ..export import page, runs, show, store
 from ..export.charts import axes
 from ..model import model
-from ..scene import lines, scene
-from ..scene.keys import quantities
+from ..scene import scene
+from ..scene.keys import lines, quantities
 from .streams import make_printable
 
 if TYPE_CHECKING:

@@ -14,7 +14,6 @@ import numpy as np
 from ..core import NotConverged
 from .lapack import cho_inverse, dgemm, dpotrf, dtrsm, use_one_blas_thread
 
-MAX_LEAF_CELLS = 100  # largest number of cells in a part that is not halved further
 DISPLACEMENT_COMPONENTS = np.arange(2)  # numbers of the displacements of a node, along x and inward
 # Smallest pivot, relative to the diagonal entry before its front is eliminated, for which round-off is not examined;
 # pivots lose digits where a long thin part bends
@@ -220,7 +219,8 @@ class _Elimination:
     def condense(self, members: np.ndarray) -> _Part:
         """Return the part that consists of some cells after the elimination of its own nodes."""
         # Large parts are halved across their longer side
-        if members.size > MAX_LEAF_CELLS:
+        # Largest number of cells in a part that is not halved further
+        if members.size > 100:
             along = self.positions[members]
             along = along[:, np.argmax(np.ptp(along, axis=0))]
             cut = np.partition(along, members.size // 2)[members.size // 2]

@@ -15,9 +15,6 @@ from ..core import frozen_array
 from ..mesh.elements import ELEMENTS, number_cells
 from .elasticity import CellPoints, Layers, Piece, compute_stress, evaluate_cells
 
-# Smallest determinant of the correlations of (1, x, y) for which a patch determines a plane; a
-# patch with a smaller one is extended by the neighbouring cells
-MIN_PLANE_FIT_DETERMINANT = 0.1
 # Elements of first order by the number of their corners, by which recovered stresses are interpolated
 ELEMENTS_BY_CORNERS = {3: ELEMENTS["triangle"], 4: ELEMENTS["quad"]}
 
@@ -239,7 +236,9 @@ def _fit_planes(patches: Patches, points, centres) -> tuple[Patches, np.ndarray]
     gram = np.add.reduceat(terms[:, :, None] * terms[:, None], starts)
     scale = np.sqrt(np.einsum("sii->si", gram))
     scale = np.where(scale > 0, scale, 1.0)
-    is_thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < MIN_PLANE_FIT_DETERMINANT
+    # Smallest determinant of the correlations of (1, x, y) for which a patch determines a plane; a
+    # patch with a smaller one is extended by the neighbouring cells
+    is_thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < 0.1
 
     # Value of the plane at the node: mean of the values, less the slopes times the mean offset
     mean = gram[:, 0, 1:] / counts[:, None]

@@ -30,8 +30,6 @@ DEPTH_RATIO = 0.25  # Ratio of the thicknesses of neighbouring bricks towards bo
 # Smallest ratio of the depths of two edges of bricks near an interface of layers; closer edges would make thin bricks
 MIN_EDGE_DEPTH_RATIO = 2.0
 CACHE_FOLDER_NAME = "patchfem-sides"
-# Number in the names of cached files, which increases when the method changes
-CACHE_VERSION = 1
 # Largest number of cached blocks; each needs up to 1 MB
 MAX_CACHED_BLOCKS = 100
 # Number of changes kept in memory, such as those of two pieces on three levels
@@ -192,7 +190,8 @@ def compute_side_change(stack: LayerStack, shape: BlockShape, level: int = 1) ->
     if is_plane:
         return SideChange(x, y, *_compute_changes(x, y, depths, stack))
     knots = [x.even.t.tolist(), y.even.t.tolist(), depths.tolist()]
-    key = repr((CACHE_VERSION, ORDER, knots, stack))
+    # Number in the names of cached files, which increases when the method changes
+    key = repr((1, ORDER, knots, stack))
     folder = user_cache.find_cache_base() / CACHE_FOLDER_NAME
     path = folder / f"{sha256(key.encode()).hexdigest()}.npz"
     is_trusted = not user_cache.prepare_folder(folder)

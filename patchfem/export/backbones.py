@@ -44,8 +44,6 @@ BACKBONE_UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1", "force": 
 SENTENCE_NAMES = {"frequency": "frequency", "damping": "damping ratio"}
 # Significant digits in a sentence on the change of frequency or damping
 CHANGE_DIGITS = {"frequency": 5, "damping": 3}
-# Largest relative change of a key that is said in percent.
-MAX_KEY_CHANGE_IN_PERCENT = 0.995
 
 
 def compute_answer(
@@ -409,6 +407,7 @@ def _describe_change(values: Sequence[float | str]) -> str:
     if not (isinstance(first, float) and isinstance(last, float) and first > 0):
         return ""
     change = last / first - 1
-    if abs(change) > MAX_KEY_CHANGE_IN_PERCENT:
+    # Largest relative change of a key that is said in percent.
+    if abs(change) > 0.995:
         return f" ({format_number(last / first, 3)} times as much)"
     return f" ({format_number(100 * abs(change), 3)} % {'more' if change > 0 else 'less'})"

@@ -41,7 +41,6 @@ MINUTE = 60.0  # CPU seconds
 MIN_GROWTH = (
     1.5  # smallest ratio of two CPU times from which their growth is known; timings scatter less
 )
-MIN_TOLERANCE = 1e-12  # smallest tolerance that a sentence names, near round-off
 # Words for the judgement of the scene as it is.
 SCENE_JUDGEMENT_WORDS = {
     Judgement.MEETS: "meets the tolerance",
@@ -236,7 +235,8 @@ def _describe_minute(runs: list[Cost]) -> list[str]:
         earlier[-1].tolerance / last.tolerance
     )
     tolerance = last.tolerance * (MINUTE / last.seconds) ** (-1 / power)
-    if tolerance < MIN_TOLERANCE:
+    # Smallest tolerance that a sentence names, near round-off
+    if tolerance < 1e-12:
         return []
     return [
         f"If CPU time goes on growing as from tolerance {earlier[-1].label} to {last.label}, a run takes a minute at a "

@@ -37,8 +37,6 @@ from .run_data import SENSOR_UNITS
 from .runs import make_origin
 
 FITTED_SCENE_FILE = "scene.fitted.toml"
-MAX_HEADLINE_VALUES = 2  # further fitted values are in the table only
-MIN_REPORTED_CORRELATION = 0.95  # smallest correlation of two values that the verdict states
 LOOP_FORCE_UNITS = {"force": "N", "friction_ratio": "1"}
 
 
@@ -138,7 +136,8 @@ def make_fit_answer(fitted: FittedKeys) -> Answer:
     # the verdict names the most correlated pair of values if their correlation is strong
     verdict = [_make_headline(details, measures), parts.residual]
     pairs = _collect_pairs(fit.intervals.correlation, list(measures))
-    if pairs and abs(pairs["correlation"].values[0]) >= MIN_REPORTED_CORRELATION:
+    # Smallest correlation of two values that the verdict states
+    if pairs and abs(pairs["correlation"].values[0]) >= 0.95:
         names = pairs["pair"].values[0].replace(", ", " and ")
         verdict.append(
             f"{names} are correlated by {pairs['correlation'].values[0]:.2f}: the measurement determines a combination "
@@ -158,7 +157,8 @@ def make_fit_answer(fitted: FittedKeys) -> Answer:
 
 def _make_headline(details: JsonObject, measures: Quantities) -> str:
     """Return a sentence with the first fitted values and their intervals."""
-    named = list(measures.items())[:MAX_HEADLINE_VALUES]
+    # Further fitted values are in the table only
+    named = list(measures.items())[:2]
     text = ", ".join(f"{key} = {format_quantity(key, one)}" for key, one in named)
     if len(measures) > len(named):
         count = len(measures) - len(named)

@@ -16,7 +16,6 @@ from .answer import Answer, Variable, Variables
 
 # attributes of a file or of a variable by name
 Attributes = dict[str, str | float | list[str] | np.ndarray]
-MIN_COMPRESSED_VALUES = 100  # arrays with fewer values are stored without compression
 
 
 def make_attributes(answer: Answer) -> Attributes:
@@ -93,7 +92,8 @@ def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
 
     has_strings = values.dtype.kind in "UO"
     options = {"fillvalue": np.nan} if values.dtype.kind == "f" else {}
-    if values.size >= MIN_COMPRESSED_VALUES:
+    # Arrays with fewer values are stored without compression
+    if values.size >= 100:
         options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
     kind = h5py.string_dtype() if has_strings else values.dtype
     stored = file.create_variable(name, variable.dims, kind, **options)

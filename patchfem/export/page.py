@@ -24,10 +24,8 @@ from .columns import Table, make_tables
 from .quantities import format_quantity
 from .rows import CHARTS, FILE_DESCRIPTIONS
 
-MIN_RATIO_AS_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
 # value in a scene file
 TomlValue = str | float | list[Any] | dict[str, Any]
-MAX_SCENE_VALUE_CHARACTERS = 80  # largest number of characters of a value of a scene
 FIGURE_COMPRESSION_LEVEL = 6  # of zlib, from 1 (fast) to 9 (small)
 
 
@@ -185,7 +183,8 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
     if abs(quantity.value - first.value) <= limit or abs(first.value) <= uncertainty:
         return text
     factor = quantity.value / first.value
-    if abs(factor) >= MIN_RATIO_AS_FACTOR:
+    # Smallest ratio to the first value that is written as a factor
+    if abs(factor) >= 10.0:
         return f"{text} (x {format_number(factor, 2)})"
     change = (quantity.value - first.value) / abs(first.value)
     return f"{text} ({100 * change:+.{1 if abs(change) > 0.01 else 2}f} %)"
@@ -201,7 +200,8 @@ def list_scene_differences(answers: Answers) -> list[Table]:
     for key in dict.fromkeys(key for scene in scenes.values() for key in scene):
         texts = [str(scene.get(key, "-")) for scene in scenes.values()]
         if len(set(texts)) > 1:
-            rows.append([key, *(shorten(text, MAX_SCENE_VALUE_CHARACTERS) for text in texts)])
+            # Largest number of characters of a value of a scene
+            rows.append([key, *(shorten(text, 80) for text in texts)])
     table = {"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}
     return [table] if rows else []
 

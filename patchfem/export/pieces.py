@@ -18,14 +18,9 @@ from .fields.film import find_contact_window, select_last_frames
 from .fields.vtkhdf import VTK_FIELDS, Frames, collect_frames
 
 FILM_ENDINGS = (".gif", ".mp4", ".html")
-# Width and height; with PIXELS_PER_INCH they give even numbers of pixels, which video formats need
-FIGURE_SIZE_INCHES = (12.0, 5.2)
-FACE_SIZE_INCHES = (11.0, 8.0)  # width and height of the maps of a face
 PIXELS_PER_INCH = 100
 FILM_SECONDS = 2.4  # duration of a film [s] within the limits of the frame rate
 FRAME_RATE_LIMITS_HZ = (3.0, 25.0)
-DRAWN_MOTION_FRACTION = 0.05  # largest motion as drawn, over the height of the contact window
-DRAWN_SLIDE_FRACTION = 0.03  # largest slide of the upper piece as drawn, over its length
 # Fraction of the stresses that the colours cover; larger ones are peaks in corners.
 COLOURED_STRESS_FRACTION = 0.998
 MM_PER_M = 1e3
@@ -104,8 +99,10 @@ def magnify_pieces(
     width, depth = high - low
     if magnify is None:
         seen = all_motion[:, cells[is_inside], 1]
-        magnify = _choose_visible_factor(DRAWN_MOTION_FRACTION * depth, seen)
-    slide_factor = min(magnify, 1.0) * _choose_visible_factor(DRAWN_SLIDE_FRACTION * width, slide)
+        # Largest motion as drawn, over the height of the contact window
+        magnify = _choose_visible_factor(0.05 * depth, seen)
+    # Largest slide of the upper piece as drawn, over its length
+    slide_factor = min(magnify, 1.0) * _choose_visible_factor(0.03 * width, slide)
     places = points + magnify * all_motion
     places[:, len(lower.points) :, 0] += slide_factor * slide[:, None]
     slid = ", slide of {:.3g} um × {:g}" if slide.any() else ""
@@ -189,7 +186,9 @@ def draw_pieces(
 
     low, high = frames.blocks["lower"].points.min(axis=0), frames.blocks["upper"].points.max(axis=0)
     windows = ((low[0], high[0], low[1], high[1]), find_contact_window(frames))
-    figure = Figure(figsize=FIGURE_SIZE_INCHES, dpi=PIXELS_PER_INCH, layout="constrained")
+    # Width and height; with PIXELS_PER_INCH they give even numbers of pixels, which video formats
+    # need
+    figure = Figure(figsize=(12.0, 5.2), dpi=PIXELS_PER_INCH, layout="constrained")
     panels = figure.subplots(1, 2) if onto is None else [onto]
 
     # All frames and panels have the same colours.
@@ -251,7 +250,8 @@ def draw_frame(frames: Frames, number: int, title: str = "", magnify=None, onto=
     else:
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=FACE_SIZE_INCHES, dpi=PIXELS_PER_INCH, layout="constrained")
+        # Width and height of the maps of a face
+        figure = Figure(figsize=(11.0, 8.0), dpi=PIXELS_PER_INCH, layout="constrained")
         axes_list = figure.subplots(2, 2).ravel()
         figure.suptitle(f"{title}, {frames.times[number]:.6g} s")
 

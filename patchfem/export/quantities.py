@@ -23,18 +23,11 @@ from .rows import QUANTITIES
 # Value relative to the largest one of a column below which it is round-off, and shown as 0
 VALUE_ROUND_OFF = 1e-12
 MAX_KEY_QUANTITIES = 10  # largest number of key quantities on a page and on the screen
-# Smallest half-width of an interval relative to its ends that the digits show
-MIN_RELATIVE_HALF_WIDTH = 1e-9
-# Largest number of digits of the end of an interval, which has two digits of the half-width
-MAX_INTERVAL_END_DIGITS = 11
-# words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
-PERCENT_NAME_ENDINGS = ("fraction", "share")
 # display units of wear coefficients and of slopes
 DISPLAY_UNIT_LADDERS = UNIT_LADDERS | {
     "m2 N-1": (("m^2/N", 1.0),),
     "m m-1": (("um/mm", 1e3),),  # slopes of roughness profiles
 }
-ANGLE_DISPLAY_UNIT = ("deg", 57.29577951308232)  # display unit of angles, and degrees in a radian
 
 KEY_QUANTITY_NAMES = tuple(
     """
@@ -113,10 +106,12 @@ def choose_scale(name: str, unit: str, size: float) -> tuple[str, float]:
         Magnitude of the number [SI].
     """
     last_word = remove_interface_number(name).rpartition("_")[2]
-    if unit == "1" and last_word in PERCENT_NAME_ENDINGS:
+    # Words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
+    if unit == "1" and last_word in ("fraction", "share"):
         return "%", 100.0
     if unit == "rad" and last_word == "phase":
-        return ANGLE_DISPLAY_UNIT
+        # Display unit of angles, and degrees in a radian
+        return ("deg", 57.29577951308232)
     if unit not in DISPLAY_UNIT_LADDERS:
         return ("" if unit == "1" else unit.replace(" s-1", "/s")), 1.0
     return choose_unit(DISPLAY_UNIT_LADDERS[unit], size)
@@ -189,8 +184,10 @@ def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) 
 
     # both ends and the value have two digits of the width of the interval, and thus the same last digit
     half_width = (ends[1] - ends[0]) / 2
-    is_shown = half_width > MIN_RELATIVE_HALF_WIDTH * max(map(abs, ends))
-    digits = MAX_INTERVAL_END_DIGITS if is_shown else MAX_SIGNIFICANT_DIGITS
+    # Smallest half-width of an interval relative to its ends that the digits show
+    is_shown = half_width > 1e-9 * max(map(abs, ends))
+    # Largest number of digits of the end of an interval, which has two digits of the half-width
+    digits = 11 if is_shown else MAX_SIGNIFICANT_DIGITS
     numbers = (value, *ends)
     text, low, high = (round_to_error(n, half_width, max_digits=digits)[0] for n in numbers)
     return f"{text} {unit} ({low} to {high})".replace("  ", " ")

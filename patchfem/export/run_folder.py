@@ -18,7 +18,6 @@ from .fields import vtkhdf
 from .folder import WEAR_STATE_FILE, Folder, list_states
 from .runs import make_run_answer
 
-MAX_WRITTEN_INTERFACES = 6  # fields of further interfaces are not written
 INTERFACES_FOLDER = "interfaces"
 
 
@@ -163,7 +162,8 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     notes = result.notes
     if result.patch is not None:
         vtkhdf.write_fields(result, folder / store.FIELDS_FILE)
-    for face in result.faces[:MAX_WRITTEN_INTERFACES]:
+    # Fields of further interfaces are not written
+    for face in result.faces[:6]:
         face_notes = _write_face(result, face, folder / INTERFACES_FOLDER / face.folder)
         notes += [f"interface {face.name}: {note}" for note in face_notes]
     result.seconds["files"] = process_time() - start_time

@@ -27,23 +27,12 @@ from .rows import HEADLINES
 from .run_data import SENSOR_UNITS, find_readings
 
 RUN_CHECK_MEASURES = ("energy_balance", "work_check")  # measures that only check a run
-# Largest number of interfaces or contact regions whose values a sentence lists
-MAX_LISTED_CONTACTS = 3
 # largest slip [m] and largest work relative to force times motion that are attributed to round-off
 SLIP_ROUND_OFF = 1e-15
 AREA_ROUND_OFF = 1e-12
-# deviation from the final position, relative to this position, at which a released output is at rest
-MAX_REST_DEVIATION = 5e-3
 ZERO_POSITION_FRACTION = 1e-9  # final position, relative to the largest motion, that counts as 0
-# Smallest number of amplitudes of a decay for which its damping is printed.
-MIN_DECAY_AMPLITUDES = 5
 # End of the name of a measure that states the scatter between random records
 SCATTER_NAME_ENDING = "_scatter"
-# Largest relative difference of the measured input from the drive of the run.
-MAX_INPUT_DIFFERENCE = 0.01
-CYCLE_ROUND_OFF = 1e-6  # largest part of a cycle that is missing through round-off
-
-MAX_HEADLINE_PARTS = 3  # largest number of measures in a headline
 
 
 def make_verdict(result: Result, measures: Quantities, details: JsonObject) -> tuple[str, ...]:
@@ -96,12 +85,14 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
 
     # The onset in a drive of levels takes the place of other parts, that of no level has a longer sentence.
     onset = _describe_onset(result, measures)
-    n_parts = MAX_HEADLINE_PARTS
+    # Largest number of measures in a headline
+    n_parts = 3
     if onset:
         n_parts -= 1 + (measures["onset_level"].value is None)
     text = ", ".join(parts[:n_parts])
     cycles = details.get("cycles")
-    if cycles is not None and cycles < 1 - CYCLE_ROUND_OFF:
+    # Largest part of a cycle that is missing through round-off
+    if cycles is not None and cycles < 1 - 1e-6:
         text = f"in {cycles:.2g} of a cycle: {text}"
     if onset:
         text = f"{onset}; at the last level: {text}"
@@ -313,7 +304,8 @@ def _describe_place(contact: JsonObject | None, sentence_form: str = "In contact
         return ""
     unit, scale = choose_unit(UNIT_LADDERS["m"], max(abs(first), abs(last)))
     count = ""
-    if len(stretches) > MAX_LISTED_CONTACTS:
+    # Largest number of interfaces or contact regions whose values a sentence lists
+    if len(stretches) > 3:
         count = f"{len(stretches)} regions from "
         stretches = [(stretches[0][0], stretches[-1][1])]
     texts = [
@@ -351,7 +343,8 @@ def list_readings(result: Result) -> list[JsonObject]:
     level = structure.drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
 
     # a row of another input belongs to another run
-    rows = [row for row in rows if abs(row.input - level) <= MAX_INPUT_DIFFERENCE * row.input]
+    # Largest relative difference of the measured input from the drive of the run.
+    rows = [row for row in rows if abs(row.input - level) <= 0.01 * row.input]
     listed = []
     for row, (name, unit) in product(rows, SENSOR_UNITS.items()):
         value = getattr(row, name)
@@ -434,7 +427,8 @@ def _describe_decay(decay) -> str:
     if decay is None:
         return ""
     known = np.flatnonzero(np.isfinite(decay.damping_error + decay.frequency_error))
-    if known.size < MIN_DECAY_AMPLITUDES:
+    # Smallest number of amplitudes of a decay for which its damping is printed.
+    if known.size < 5:
         return ""
     parts = [
         f"{format_value(decay.frequency[k], decay.frequency_error[k], unit='Hz')} and damping ratio "
@@ -458,7 +452,9 @@ def describe_rest(time, output, error: float = 0.0, last_amplitude: float | None
     """
     largest = np.abs(output).max()
     end = 0.0 if abs(output[-1]) < ZERO_POSITION_FRACTION * largest else output[-1]
-    rest_limit = max(error, MAX_REST_DEVIATION * abs(end), ZERO_POSITION_FRACTION * largest)
+    # Deviation from the final position, relative to this position, at which a released output is at
+    # rest
+    rest_limit = max(error, 5e-3 * abs(end), ZERO_POSITION_FRACTION * largest)
     last_tenth = time >= time[-1] - 0.1 * (time[-1] - time[0])
     amplitude = np.ptp(output[last_tenth]) / 2
     amplitude = amplitude if last_amplitude is None else min(last_amplitude, amplitude)

@@ -11,10 +11,7 @@ MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
 MIN_RELATIVE_SQUARES_DECREASE = 0.36
 # Smallest distance of two sinusoids in spectral lines (1/T for a record of length T).
 MIN_SPECTRAL_LINE_SPACING = 3
-MIN_SINUSOID_RATIO = 0.01  # smallest amplitude of a sinusoid, relative to the largest one
 DAMPING_ROUND_OFF = 1e-10  # error of a damping ratio of a record without noise
-# Initial decay rates of a further sinusoid, times the record length.
-START_DECAY_RATES = (0.3, 3.0, 30.0)
 
 
 def fit_decay(time, value) -> FittedModes:
@@ -49,7 +46,8 @@ def fit_decay(time, value) -> FittedModes:
     motions = np.einsum("nkc,nc->nk", problem.tabulate(fit.poles)[:, 0], fit.coefficients)
     energy = np.sum(motions**2, axis=1)
     is_kept = fit.damping > DAMPING_ROUND_OFF
-    is_kept &= energy > MIN_SINUSOID_RATIO**2 * energy.max()
+    # Smallest amplitude of a sinusoid, relative to the largest one
+    is_kept &= energy > 0.01**2 * energy.max()
     if not is_kept.any():
         largest = int(np.argmax(energy))
         error = max(problem.estimate_damping_errors(fit)[largest], DAMPING_ROUND_OFF)
@@ -78,4 +76,5 @@ def _find_starts(time, fit: SinusoidFit) -> list[np.ndarray]:
         distance = max(2 * np.pi * MIN_SPECTRAL_LINE_SPACING / time[-1], rate)
         lines[np.abs(omega - known_omega) < distance] = 0.0
     start = omega[np.argmax(lines)]
-    return [np.array([start, scaled_rate / time[-1]]) for scaled_rate in START_DECAY_RATES]
+    # Initial decay rates of a further sinusoid, times the record length.
+    return [np.array([start, scaled_rate / time[-1]]) for scaled_rate in (0.3, 3.0, 30.0)]

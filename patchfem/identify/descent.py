@@ -15,20 +15,12 @@ from scipy.optimize import lsq_linear
 from ..core import Missing, PatchfemError
 
 FINITE_DIFFERENCE_STEP = 1e-5  # step of finite differences, relative to the range of a parameter
-MIN_BOUND_RATIO_FOR_LOG = 10  # largest ratio of upper to lower bound of a linear scale
-# Number of the last residuals that are kept: a search returns to its neighbours
-N_CACHED_RESIDUALS = 32
 # Predicted relative decrease of the sum of squares by a step, below which a descent has converged; that by the round-off of
 # differences is smaller
 COST_TOL = 1e-10
-QUICK_COST_TOL = 1e-5  # COST_TOL of an expensive residual, whose own errors are about as large
-STEP_TOL = 1e-12  # smallest step above round-off, relative to the range of a parameter
 MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
-FIRST_TRUST = 0.3  # largest change of a parameter in the first step, relative to its range
 # Ratio of the decrease of the sum of squares to the predicted one, below which the next steps are shorter
 MIN_DECREASE_RATIO = 0.25
-# Ratio of this kind below which the Jacobian of an expensive residual is computed again
-MIN_SECANT_RATIO = 0.5
 # Largest distance of a point from a known minimum that a descent has reached, relative to the ranges, and largest relative
 # difference of the sums of squares
 SAME_POINT_DISTANCE = 0.02
@@ -87,7 +79,8 @@ def make_search_space(low, high) -> SearchSpace:
         )
     if not (np.isfinite([low, high]).all() and (low < high).all()):
         raise ValueError("bounds must be finite with low < high")
-    return SearchSpace(low, high, (low > 0) & (high > MIN_BOUND_RATIO_FOR_LOG * low))
+    # Largest ratio of upper to lower bound of a linear scale
+    return SearchSpace(low, high, (low > 0) & (high > 10 * low))
 
 
 class SearchCounts(NamedTuple):
@@ -126,7 +119,8 @@ class UnitCubeResidual:
         self.counts = SearchCounts(0, 0, "")
         self.largest = 0.0
         self.rows = 0
-        self._evaluate_once = lru_cache(N_CACHED_RESIDUALS)(self._evaluate)
+        # Number of the last residuals that are kept: a search returns to its neighbours
+        self._evaluate_once = lru_cache(32)(self._evaluate)
 
     def __call__(self, u) -> np.ndarray | None:
         """Return the residual (r,) at u (n,), or None if the evaluation fails."""
@@ -291,9 +285,11 @@ def descend(model: UnitCubeResidual, u, known: Sequence[Descent] = ()) -> Descen
     u = np.array(u, float)
     if model(u) is None:
         return Descent(u, np.inf, False, model.rows)
-    tolerance = QUICK_COST_TOL if model.is_expensive else COST_TOL
+    # COST_TOL of an expensive residual, whose own errors are about as large
+    tolerance = 1e-5 if model.is_expensive else COST_TOL
     linear = LinearModel(model, u, range(u.size))
-    trust = FIRST_TRUST
+    # Largest change of a parameter in the first step, relative to its range
+    trust = 0.3
     is_converged = False
     for _ in range(MAX_EVALUATIONS):
         # the bounded linear problem predicts the sum of squares after the step
@@ -307,7 +303,8 @@ def descend(model: UnitCubeResidual, u, known: Sequence[Descent] = ()) -> Descen
             distance = np.abs([*(end.u - point), end.cost / max(predicted, 1e-300) - 1]).max()
             if end.is_converged and distance <= SAME_POINT_DISTANCE:
                 return end
-        if linear.cost <= model.floor or expected <= tolerance * linear.cost or size < STEP_TOL:
+        # Smallest step above round-off, relative to the range of a parameter
+        if linear.cost <= model.floor or expected <= tolerance * linear.cost or size < 1e-12:
             is_converged = bool(np.isfinite(linear.jacobian).all())
             if linear.is_fresh or linear.cost <= model.floor:
                 # Steps converge linearly where the residual is large, so that the last one still counts.
@@ -329,6 +326,7 @@ def descend(model: UnitCubeResidual, u, known: Sequence[Descent] = ()) -> Descen
             trust = size / 4
         elif ratio > 1 - MIN_DECREASE_RATIO and size >= 0.99 * trust:
             trust *= 2
-        if ratio < MIN_SECANT_RATIO:
+        # Ratio of this kind below which the Jacobian of an expensive residual is computed again
+        if ratio < 0.5:
             linear.differentiate()
     return Descent(linear.u, linear.cost, is_converged, model.rows)

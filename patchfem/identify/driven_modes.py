@@ -29,12 +29,8 @@ N_RECORD_SEGMENTS = 8
 MIN_RECORD_SAMPLES = 64 * N_RECORD_SEGMENTS  # smallest number of samples of a record
 # Half-width of the main lobe of a Hann window, which hides the lines near 0, in spectral lines.
 WINDOW_WIDTH_LINES = 1.5
-# Smallest input power of an excited spectral line, relative to the largest one.
-MIN_INPUT_POWER = 1e-6
 # Highest frequency that is used, relative to the Nyquist frequency, because of filters and aliasing.
 MAX_NYQUIST_FRACTION = 0.8
-# Initial peak widths zeta f of a further mode, in spectral lines of a segment.
-START_PEAK_WIDTHS = (0.1, 1.0, 5.0)
 
 
 class _DrivenRecord:
@@ -91,7 +87,8 @@ class _DrivenRecord:
         line_width = 1 / (size * self.step)
         is_seen = frequency > WINDOW_WIDTH_LINES * line_width
         is_seen &= frequency <= MAX_NYQUIST_FRACTION / (2 * self.step)
-        is_seen &= densities.input > MIN_INPUT_POWER * densities.input[is_seen].max()
+        # Smallest input power of an excited spectral line, relative to the largest one.
+        is_seen &= densities.input > 1e-6 * densities.input[is_seen].max()
         if not is_seen.any():
             raise PatchfemError(
                 "the input is zero or constant after the start of the record, so there is no response to it; begin the "
@@ -100,7 +97,8 @@ class _DrivenRecord:
 
         explained = np.where(is_seen, power * densities.coherence(), -1.0)
         peak = frequency[int(np.argmax(explained))]
-        zetas = np.clip(np.multiply(START_PEAK_WIDTHS, line_width / peak), 1e-4, 0.2)
+        # Initial peak widths zeta f of a further mode, in spectral lines of a segment.
+        zetas = np.clip(np.multiply((0.1, 1.0, 5.0), line_width / peak), 1e-4, 0.2)
         return [2 * np.pi * peak * np.array([1.0, zeta]) for zeta in zetas]
 
 

@@ -8,11 +8,6 @@ from ..core import Outcome
 from .descent import MAX_EVALUATIONS
 from .least_squares import Fit
 
-# Smallest sensitivity of a parameter with an effect on the residual, relative to the largest sensitivity.
-MIN_SENSITIVITY = 1e-9
-# Smallest decrease of an interval for which a further test is advised
-MIN_INTERVAL_DECREASE_FRACTION = 0.1
-
 
 def describe_fit(fit: Fit, names: Sequence[str], bounds: Sequence[tuple[str, str]]) -> list[str]:
     """Return sentences about parameters that a fit does not determine, and failures of its search.
@@ -44,7 +39,9 @@ def describe_fit(fit: Fit, names: Sequence[str], bounds: Sequence[tuple[str, str
     intervals = fit.intervals
     sentences += [_describe_direction(row, names) for row in intervals.unknown]
     in_combination = intervals.unknown.any(axis=0)
-    min_sensitivity = MIN_SENSITIVITY * max(np.max(intervals.sensitivity), fit.rms)
+    # Smallest sensitivity of a parameter with an effect on the residual, relative to the largest
+    # sensitivity.
+    min_sensitivity = 1e-9 * max(np.max(intervals.sensitivity), fit.rms)
 
     # An interval that ends at a bound, no effect on the data, or an interval over the whole range.
     for i, name in enumerate(names):
@@ -130,7 +127,8 @@ def advise_test(
     widest = int(np.argmax(sizes[determined]))
     ratio = np.sqrt(after[:, widest, widest])
     best = int(np.argmin(ratio))
-    if ratio[best] > 1 - MIN_INTERVAL_DECREASE_FRACTION:
+    # Smallest decrease of an interval for which a further test is advised
+    if ratio[best] > 1 - 0.1:
         return ""
     return (
         f"a further measurement {places[best]} would narrow the interval of {names[determined[widest]]} most, by about "

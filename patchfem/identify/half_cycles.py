@@ -18,18 +18,10 @@ MIN_HALF_CYCLE_SAMPLES = 5  # smallest number of samples in a half cycle
 # Smallest relative standard deviation of the midpoint (relative to the half period) and the size of a half cycle,
 # because a half cycle is not exactly a sine.
 SINE_FIT_ERROR = 3e-5
-# Largest relative standard deviation of the size of a half cycle due to noise; the decay ends where it is larger.
-MAX_HALF_CYCLE_NOISE = 0.25
-# Number of fits of all half cycles, each with half periods and decay rates from the previous fit.
-N_HALF_CYCLE_FITS = 3
-MAX_MIDPOINT_ITERATIONS = 4  # largest number of iterations for the midpoint of a half cycle
-MAX_MIDPOINT_SHIFT = 0.35  # largest distance of a midpoint from its prediction, in half periods
 # Half cycles on each side from which the noise of a half cycle is estimated
 N_NEIGHBOUR_HALF_CYCLES = 8
 # Cycles at the beginning of a decay to which the first sinusoid is fitted
 N_CYCLES_OF_FIRST_SINE = 1.2
-# Smallest place of the middle of the first half cycle, in half periods, one half less the error of the fit
-MIN_FIRST_MIDPOINT = 0.48
 # Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
 # decay rate [1/s].
 FIRST_CYCLE_BOUNDS = ((0.75, -np.inf), (1.3, np.inf))
@@ -92,7 +84,9 @@ def find_half_cycles(time, value) -> HalfCycles:
     candidates = []
     for is_viscous in (False, True):
         sines = followed
-        for _ in range(N_HALF_CYCLE_FITS):
+        # Number of fits of all half cycles, each with half periods and decay rates from the
+        # previous fit.
+        for _ in range(3):
             sines = _refine_half_cycles(time, value, sines, is_viscous=is_viscous)
         if len(sines) > 2:
             candidates.append(_FittedSines(*np.array(sines).T))
@@ -172,7 +166,9 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     # A half cycle goes from peak to peak around a zero of the sinusoid, and must lie completely in the record.
     half_period = np.pi / cycle.poles[0, 0]
     middle = -np.arctan2(cosine, sine) / np.pi % 1.0 * half_period
-    if middle < MIN_FIRST_MIDPOINT * half_period:
+    # Smallest place of the middle of the first half cycle, in half periods, one half less the error
+    # of the fit
+    if middle < 0.48 * half_period:
         middle += half_period
     return time[0] + middle, half_period
 
@@ -193,7 +189,9 @@ def _follow_half_cycles(time, value, middle: float, length: float) -> list[_Fitt
         if sine is None or (sines and sine.size * sines[-1].size > 0):
             break
         noise = np.sqrt(sine.square / sine.n_free) * sine.size_error
-        if noise > MAX_HALF_CYCLE_NOISE * abs(sine.size):
+        # Largest relative standard deviation of the size of a half cycle due to noise; the decay
+        # ends where it is larger.
+        if noise > 0.25 * abs(sine.size):
             break
         sines.append(sine)
         if len(sines) > 2:
@@ -254,7 +252,8 @@ def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _
     """
     # c + exp(-rate t) (a sin + b cos) is fitted around the midpoint, which moves until b vanishes.
     predicted = middle
-    for _ in range(MAX_MIDPOINT_ITERATIONS):
+    # Largest number of iterations for the midpoint of a half cycle
+    for _ in range(4):
         low, high = np.searchsorted(time, (middle - length / 2, middle + length / 2))
         t = time[low:high] - middle
         if t.size < MIN_HALF_CYCLE_SAMPLES:
@@ -267,7 +266,8 @@ def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _
         coefficients = np.linalg.lstsq(columns, value[low:high], rcond=None)[0]
         _, sine, cosine = coefficients
         correction = -np.arctan2(cosine * np.sign(sine), abs(sine)) * length / np.pi
-        if not abs(middle + correction - predicted) <= MAX_MIDPOINT_SHIFT * length:
+        # Largest distance of a midpoint from its prediction, in half periods
+        if not abs(middle + correction - predicted) <= 0.35 * length:
             return None
         if abs(correction) < 1e-9 * length:
             break

@@ -19,24 +19,7 @@ from .descent import LinearModel, UnitCubeResidual
 
 # Smallest singular value of a determined direction, relative to the largest one of the scaled Jacobian.
 MIN_SINGULAR_VALUE = 1e-6
-# Smallest change of the residual by a parameter with an effect, relative to the largest residual.
-MIN_RESIDUAL_EFFECT = 1e-9
-# Largest squared component of a determined parameter in an undetermined direction.
-MIN_DIRECTION_COMPONENT = 1e-3
-# Largest relative deviation of the growth of the sum of squares from that of a linear model at the end of an interval;
-# beyond it, the profile is followed.
-MAX_NONLINEARITY = 0.2
-# Smallest half-width of an interval above round-off, relative to the range of the parameter.
-MIN_INTERVAL_HALF_WIDTH = 1e-9
 PROFILE_END_TOL = 1e-3  # tolerance of the end of a profile, relative to its half-width
-MAX_PROFILE_STEPS = 60  # steps to the end of a profile; about four suffice
-# Largest deviation of the growth from the predicted one, relative to that at the end, of a step that is taken
-MAX_GROWTH_DEVIATION = 0.5
-MIN_CORRELATED_ROWS = 20  # smallest number of rows for a significant correlation
-# Largest correlation that is attributed to chance, in standard deviations 1/sqrt(rows) of independent rows.
-CHANCE_CORRELATION_FACTOR = 2.0
-# Smallest correlation between cycles at which they count as repetitions of the same error.
-MIN_CYCLE_CORRELATION = 0.5
 
 
 class IntervalKind(StrEnum):
@@ -115,7 +98,8 @@ def _find_end(start: LinearModel, k: int, sign: float, growth: float, tolerance:
     linear = copy(start)
     cost = start.cost
     trust = 1.0
-    for count in range(MAX_PROFILE_STEPS):
+    # Steps to the end of a profile; about four suffice
+    for count in range(60):
         point, predicted = _predict_end(linear, k, sign, cost + growth, trust)
         step = sign * (point[k] - linear.u[k])
         distance = sign * (point[k] - minimum[k])
@@ -136,7 +120,9 @@ def _find_end(start: LinearModel, k: int, sign: float, growth: float, tolerance:
         is_inside = ((point > 0) & (point < 1)).all()
         if not count and is_inside and deviation <= tolerance:
             return _End(distance, True)
-        if deviation > MAX_GROWTH_DEVIATION:
+        # Largest deviation of the growth from the predicted one, relative to that at the end, of a
+        # step that is taken
+        if deviation > 0.5:
             trust = np.abs(point - linear.u).max() / 2
             if not linear.is_fresh:
                 linear.differentiate()
@@ -230,7 +216,9 @@ def compute_intervals(
     # without effect on the residual contains it.
     jacobian = np.nan_to_num(linear.jacobian)
     norms = np.linalg.norm(jacobian, axis=0)
-    has_effect = norms > MIN_RESIDUAL_EFFECT * model.largest * np.sqrt(model.rows)
+    # Smallest change of the residual by a parameter with an effect, relative to the largest
+    # residual.
+    has_effect = norms > 1e-9 * model.largest * np.sqrt(model.rows)
     on_bound = (u <= 0) | (u >= 1)
     free = np.flatnonzero(~on_bound & has_effect)
     scaled = jacobian[:, free] / norms[free]
@@ -242,7 +230,8 @@ def compute_intervals(
     covariance = np.full((n, n), np.nan)
     covariance[np.ix_(free, free)] = shifts[free] @ shifts[free].T * variance
     is_unknown = np.zeros(n, bool)
-    is_unknown[free] = (null_vectors**2 > MIN_DIRECTION_COMPONENT).any(axis=0)
+    # Largest squared component of a determined parameter in an undetermined direction.
+    is_unknown[free] = (null_vectors**2 > 1e-3).any(axis=0)
     covariance[is_unknown] = covariance[:, is_unknown] = np.nan
     deviation = np.sqrt(np.diag(covariance))
 
@@ -264,9 +253,13 @@ def compute_intervals(
     for k in np.flatnonzero(has_effect & ~is_unknown):
         half_width = np.sqrt(growth / variance) * deviation[k]
         found = [_End(half_width, True)] * 2
-        if not half_width < MIN_INTERVAL_HALF_WIDTH:
+        # Smallest half-width of an interval above round-off, relative to the range of the
+        # parameter.
+        if not half_width < 1e-9:
             is_exact = on_bound[k] or kind == IntervalKind.KNOWN
-            tolerance = 0.0 if is_exact else MAX_NONLINEARITY
+            # Largest relative deviation of the growth of the sum of squares from that of a linear
+            # model at the end of an interval; beyond it, the profile is followed.
+            tolerance = 0.0 if is_exact else 0.2
             found = [_find_end(linear, k, sign, growth, tolerance) for sign in (-1.0, 1.0)]
         distances = np.array([one.distance for one in found])
         open_ends[k] = ~np.isfinite(distances)
@@ -323,14 +316,17 @@ def estimate_effective_rows(residual) -> float:
     r = np.asarray(residual, float)
     n = r.size
     r = r - r.mean()
-    if n < MIN_CORRELATED_ROWS or not np.ptp(r) > 0:
+    # Smallest number of rows for a significant correlation
+    if n < 20 or not np.ptp(r) > 0:
         return float(n)
 
     # autocorrelation with all lags divided by n (biased estimate), which limits their sum
     spectrum = np.fft.rfft(r, 2 * n)
     rho = np.fft.irfft(spectrum * spectrum.conj())[:n]
     rho /= rho[0]
-    if rho[1] <= CHANCE_CORRELATION_FACTOR / np.sqrt(n):
+    # Largest correlation that is attributed to chance, in standard deviations 1/sqrt(rows) of
+    # independent rows.
+    if rho[1] <= 2.0 / np.sqrt(n):
         return float(n)
     # a lag without correlation exists, because the sum over all lags is -1/2
     first_lag = int(np.flatnonzero(rho[1:] <= 0)[0]) + 1
@@ -341,6 +337,7 @@ def estimate_effective_rows(residual) -> float:
     if lags.size > 2:
         correlation = rho[lags] / (1 - lags / n)
         best = int(np.argmax(correlation))
-        if correlation[best] >= MIN_CYCLE_CORRELATION:
+        # Smallest correlation between cycles at which they count as repetitions of the same error.
+        if correlation[best] >= 0.5:
             count /= 1 + (n / lags[best] - 1) * min(correlation[best], 1.0)
     return float(np.clip(count, 1.0, n))

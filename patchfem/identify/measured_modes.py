@@ -12,15 +12,8 @@ from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, fit_driven_mode
 from .half_cycles import describe_missing_samples_at_end, find_half_cycles
 from .sinusoids import FittedModes
 
-INPUT_QUANTITIES = ("force", "base_acceleration")  # possible inputs of a record
-# Largest error of a sample time in time steps; times in text files may have only six digits.
-MAX_SAMPLE_TIME_ERROR = 1e-3
 # Largest half-width of the interval of a damping ratio, relative to the damping ratio.
 MAX_ZETA_ERROR_RATIO = 2.0
-# Largest misfit of a driven response for which no note is issued.
-MAX_DRIVEN_MISFIT = 0.1
-# Largest misfit of a free decay for which no note is issued.
-MAX_DECAY_MISFIT = 0.05
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -77,7 +70,8 @@ def find_time_step(time: np.ndarray) -> float:
     """
     step = (time[-1] - time[0]) / (time.size - 1)
     deviation = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
-    if deviation > max(MAX_SAMPLE_TIME_ERROR, 1e-5 * time.size):
+    # Largest error of a sample time in time steps; times in text files may have only six digits.
+    if deviation > max(1e-3, 1e-5 * time.size):
         raise PatchfemError(
             f"the times deviate from an even step of {step:.6g} s by up to {deviation:.2g} of this step; an "
             "evenly sampled record is needed"
@@ -106,7 +100,8 @@ def identify_driven_modes(
         If the record lacks time, input or response, has several inputs or responses, or shows no mode.
     """
     response_name = find_response_name(values)
-    inputs = [name for name in INPUT_QUANTITIES if name in values]
+    # Possible inputs of a record
+    inputs = [name for name in ("force", "base_acceleration") if name in values]
     if len(inputs) != 1 or "time" not in values:
         raise PatchfemError(
             "modes need time, a response and one input (force or base_acceleration), "
@@ -129,7 +124,8 @@ def identify_driven_modes(
         _convert_force_residues(modes) if input_name == "force" else _convert_base_residues(modes)
     )
 
-    if modes.misfit > MAX_DRIVEN_MISFIT:
+    # Largest misfit of a driven response for which no note is issued.
+    if modes.misfit > 0.1:
         notes.append(
             f"the modes leave {100 * modes.misfit:.0f} % of the response (root mean square) unexplained: the "
             "record is noisy, or the rig is not linear"
@@ -302,7 +298,8 @@ def identify_decay_modes(values: dict[str, np.ndarray], begin: float | None = No
     notes = [
         "a free decay gives neither the modal mass nor the mode shapes: set moving_mass, slide, base and output"
     ]
-    if decay.misfit > MAX_DECAY_MISFIT:
+    # Largest misfit of a free decay for which no note is issued.
+    if decay.misfit > 0.05:
         notes.append(
             f"the decay leaves {100 * decay.misfit:.0f} % of the record unexplained: the decay is noisy or "
             "not exponential, as with friction damping; the damping given is a mean over the record"

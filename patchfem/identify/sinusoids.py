@@ -12,14 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-# Largest condition number of the design matrix; smaller singular values are ignored.
-MAX_FIT_CONDITION = 1e12
-MAX_START_EVALUATIONS = 12  # evaluations from each initial guess; only the best is refined further
 START_TOL = 1e-3  # relative change at convergence from an initial guess
 MAX_EVALUATIONS = 100  # largest number of evaluations of a fit
-FIT_TOL = 1e-13  # relative change at convergence of a fit
-MAX_EXPONENT = 700.0  # larger arguments of an exponential function overflow
-MIN_MISFIT = 1e-9  # smallest residual above round-off, relative to the record
 
 
 class Limits(NamedTuple):
@@ -128,7 +122,8 @@ class SinusoidProblem:
         n_columns = 2 if self.compute_forced is None else 3
         columns = np.empty((len(poles), 3, self.time.size, n_columns))
         for column, (omega, rate) in zip(columns, poles):
-            envelope = np.exp(-np.clip(rate * self.time, -50.0, MAX_EXPONENT))
+            # Larger arguments of an exponential function overflow
+            envelope = np.exp(-np.clip(rate * self.time, -50.0, 700.0))
             cosine = envelope * np.cos(omega * self.time)
             sine = envelope * np.sin(omega * self.time)
             column[:, :, 0] = cosine, -self.time * sine, -self.time * cosine
@@ -152,7 +147,8 @@ class SinusoidProblem:
         design = np.column_stack([*self.fixed, own])
         norms = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
         basis, triangular = np.linalg.qr(design / norms)
-        scaled = np.linalg.lstsq(triangular, basis.T @ self.value, rcond=1 / MAX_FIT_CONDITION)[0]
+        # Largest condition number of the design matrix; smaller singular values are ignored.
+        scaled = np.linalg.lstsq(triangular, basis.T @ self.value, rcond=1 / 1e12)[0]
         coefficients = (scaled / norms)[len(self.fixed) :].reshape(columns.shape[::3])
         fit = SinusoidFit(np.asarray(poles), coefficients, design / norms @ scaled - self.value)
 
@@ -205,13 +201,16 @@ class SinusoidProblem:
             Without sinusoids if none is better than the columns `fixed` alone, such as a constant.
         """
         best, _ = self.solve(np.empty((0, 2)))
-        while len(best.poles) < limits.count and best.mean_square > (MIN_MISFIT * self.scale) ** 2:
+        # Smallest residual above round-off, relative to the record
+        while len(best.poles) < limits.count and best.mean_square > (1e-9 * self.scale) ** 2:
             attempts = []
             for start in find_starts(best):
                 poles = [*best.poles, start]
-                attempts.append(self.refine(poles, MAX_START_EVALUATIONS, START_TOL))
+                # Evaluations from each initial guess; only the best is refined further
+                attempts.append(self.refine(poles, 12, START_TOL))
             start = min(attempts, key=lambda fit: fit.mean_square)
-            further = self.refine(start.poles, MAX_EVALUATIONS, FIT_TOL)
+            # Relative change at convergence of a fit
+            further = self.refine(start.poles, MAX_EVALUATIONS, 1e-13)
 
             # two close or overdamped sinusoids fit a decay that is not exponential
             omega, rate = further.poles.T

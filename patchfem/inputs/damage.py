@@ -5,7 +5,6 @@ from contextlib import contextmanager
 
 from ..exceptions import PatchfemError
 
-MAX_REASON_LENGTH = 160  # largest number of characters of a quoted reason
 MAX_LISTED_NAMES = 12  # largest number of names that a message lists
 
 # Exceptions that are mistakes in the program; a damaged file leads to any other one in a library.
@@ -37,5 +36,6 @@ def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
     except (PatchfemError, *PROGRAM_MISTAKES):
         raise
     except Exception as error:
-        reason = shorten(error, MAX_REASON_LENGTH)
+        # Largest number of characters of a quoted reason
+        reason = shorten(error, 160)
         raise PatchfemError(f"{message} ({reason}){remedy}") from None

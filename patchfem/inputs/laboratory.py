@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
-from ..scene.files import UNIVERSAL_EXTENSIONS
+from ..scene.keys.tables import UNIVERSAL_EXTENSIONS
 from . import matlab, universal
 from .damage import shorten
 from .loops import EXPORTED_NAMES, find_standard_name

@@ -25,9 +25,6 @@ MATRIX_NAMES = {
     "mass": ("m", "maax", "maa", "mgg", "mass"),
     "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
 }
-# Files of Nastran, which have a refusal of their own because earlier versions read them.
-NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")
-MAX_MATRIX_VALUES = 5 * 10**7  # largest number of values in a matrix
 MAX_MATRIX_ROWS = 2 * 10**6  # largest number of rows in a matrix
 
 
@@ -54,7 +51,8 @@ def read_matrix(path, matrix_name: str) -> Matrix:
     extension = path.suffix.lower()
     if extension not in READERS_BY_EXTENSION:
         advice = advise_on_name(extension, READERS_BY_EXTENSION)
-        if extension in NASTRAN_EXTENSIONS:
+        # Files of Nastran, which have a refusal of their own because earlier versions read them.
+        if extension in (".op4", ".pch", ".bdf", ".dat"):
             advice = describe_removed("reading files of Nastran")
         raise PatchfemError(f"{path}: {advice}")
     with refuse_damage(f"{path} cannot be read"):
@@ -167,7 +165,8 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
         lines = (line for line in file if line.strip() and line[0] != "%")
         n_rows, n_columns, *count = map(int, next(lines, "").split())
         n_numbers = count[0] if count else n_rows * n_columns
-        max_numbers = min(MAX_MATRIX_VALUES, path.stat().st_size)
+        # Largest number of values in a matrix
+        max_numbers = min(5 * 10**7, path.stat().st_size)
         if max(n_rows, n_columns) > MAX_MATRIX_ROWS or n_numbers > max_numbers:
             raise PatchfemError(
                 f"{path}: the header announces {n_numbers} numbers in {n_rows} x {n_columns}, more than "

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
-from ..scene.files import UNIVERSAL_EXTENSIONS
 from ..scene.keys.quantities import UNIT_FACTORS
+from ..scene.keys.tables import UNIVERSAL_EXTENSIONS
 from .records import select_channels
 from .tables import TableFormat, read_columns
 from .units import CHANNEL_UNITS, SI_UNITS

@@ -6,7 +6,6 @@ from scipy import sparse
 from ..core import PatchfemError
 from .tables import MAX_SI_VALUE
 
-MAX_SKEW_FRACTION = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
 # End of the message about a skew-symmetric matrix
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
 
@@ -137,7 +136,8 @@ def symmetrize(values, subject: str):
     # A small skew part is round-off of the program that wrote the matrix
     skew = abs(values - values.T).max()
     largest = abs(values).max()
-    if skew > MAX_SKEW_FRACTION * largest:
+    # Largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
+    if skew > 1e-8 * largest:
         raise PatchfemError(
             f"{subject} is not symmetric: entries differ from the transpose by {skew:.3g}, "
             f"which is {skew / largest:.2g} of the largest entry; {SKEW_REFUSAL}"

@@ -23,19 +23,11 @@ from .measures import ArrayPair
 
 # Candidate spans of a fit: number of half cycles on either side of a point.
 CANDIDATE_HALF_SPANS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
-# Largest difference between the slopes fitted over two spans, in standard deviations.
-MAX_SLOPE_DEVIATIONS = 2.0
-# Half-width of a 95 % interval in standard deviations; above 1.96, because the span of the fit is
-# chosen by means of the same data.
-INTERVAL_HALF_WIDTH_IN_DEVIATIONS = 2.5
 # Number of half cycles on either side from whose third differences the noise is estimated.
 NOISE_HALF_WIDTH_IN_HALF_CYCLES = 8
 VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
-# Largest speed at which a sample counts as a reversal, relative to the largest speed.
-REST_SPEED_TOL = 1e-12
 # Smallest half cycle that is not attributed to round-off, relative to the largest one.
 MIN_HALF_CYCLE_RATIO = 1e-9
-PERIOD_START_TOL = 1e-9  # Round-off of a period by which a sample may lie before it.
 # Largest motion between two reversals, relative to the range in one period, that is attributed to a
 # faster mode.
 MAX_RIPPLE_RATIO = 0.25
@@ -118,7 +110,8 @@ def locate_reversals(time, position, speed) -> ArrayPair:
         Samples of time [s], position [m] and speed [m/s] at any spacing, with at most one reversal
         between two samples.
     """
-    speed = np.where(np.abs(speed) <= REST_SPEED_TOL * max_abs(speed), 0.0, speed)
+    # Largest speed at which a sample counts as a reversal, relative to the largest speed.
+    speed = np.where(np.abs(speed) <= 1e-12 * max_abs(speed), 0.0, speed)
     resting_samples = np.flatnonzero(speed == 0)
     inside = find_reversal_steps(time, position, speed)
     step_times = time[inside.step] + inside.fraction * np.diff(time)[inside.step]
@@ -150,7 +143,8 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     float or None
         Half the range in the last period if the motion is at rest there; None if it has too few turns.
     """
-    last_range = float(np.ptp(position[time >= time[-1] - period * (1 + PERIOD_START_TOL)]))
+    # Round-off of a period by which a sample may lie before it.
+    last_range = float(np.ptp(position[time >= time[-1] - period * (1 + 1e-9)]))
     if last_range <= MIN_HALF_CYCLE_RATIO * np.ptp(position):
         return last_range / 2
     times, places = locate_reversals(time, position, speed)
@@ -324,7 +318,8 @@ def fit_slopes(values, noise) -> Slopes:
     is_accepted = ~np.isnan(slopes)
     for k in range(1, spans.size):
         excess = np.sqrt(np.maximum(noises[:k] ** 2 - noises[k] ** 2, 0.0))
-        limits = MAX_SLOPE_DEVIATIONS * excess + VALUE_ROUND_OFF * np.abs(slopes[:k])
+        # Largest difference between the slopes fitted over two spans, in standard deviations.
+        limits = 2.0 * excess + VALUE_ROUND_OFF * np.abs(slopes[:k])
         differs = (np.abs(slopes[k] - slopes[:k]) > limits).any(axis=0)
         is_accepted[k] &= is_accepted[k - 1] & ~differs
     longest = is_accepted.sum(axis=0) - 1
@@ -344,7 +339,9 @@ def fit_slopes(values, noise) -> Slopes:
     # noise is estimated from the second difference.
     curvature = np.where(spread > 0, 0.0, np.abs(np.diff(values, 2)) / 2)
     bias = np.where(np.isnan(bias), curvature, bias)
-    error = INTERVAL_HALF_WIDTH_IN_DEVIATIONS * spread + bias + VALUE_ROUND_OFF * np.abs(slope)
+    # Half-width of a 95 % interval in standard deviations; above 1.96, because the span of the fit
+    # is chosen by means of the same data.
+    error = 2.5 * spread + bias + VALUE_ROUND_OFF * np.abs(slope)
     return Slopes(slope, error, span)
 
 

@@ -99,10 +99,6 @@ def is_all_stuck(window, max_stick_slip: float) -> bool:
     )
 
 
-# Smallest relative change between two samples from which the amplitude of a mode is computed.
-MIN_RELATIVE_SAMPLE_CHANGE = 1e-6
-
-
 class VibratingMode(NamedTuple):
     """Free vibration of a mode while all interfaces stick.
 
@@ -144,7 +140,8 @@ def compute_stuck_vibration(modes, stiffness, motion) -> list[VibratingMode]:
     values, shapes = np.linalg.eig(matrix)
     state = np.concatenate([motion.modal[:2], motion.modal_rate[:2]], axis=1)
     growth = np.expm1(values * (motion.time[1] - motion.time[0]))
-    known = (values.imag > 0) & (np.abs(growth) > MIN_RELATIVE_SAMPLE_CHANGE)
+    # Smallest relative change between two samples from which the amplitude of a mode is computed.
+    known = (values.imag > 0) & (np.abs(growth) > 1e-6)
     sizes = np.linalg.solve(shapes, (state[1] - state[0]).astype(complex))[known] / growth[known]
     # a pair of conjugate eigenvalues corresponds to one real sinusoid
     amplitudes = 2 * np.abs(modes.output @ shapes[:n, known] * sizes)

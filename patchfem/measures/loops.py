@@ -17,12 +17,6 @@ from ..effects import law_has_trait
 from ..motion_measures import find_reversal_steps, measure_loop
 from .measures import MODAL_COORDINATE_ROUND_OFF, Values, compute_harmonic
 
-SAME_EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
-# Largest rate at which an interface counts as at rest, relative to the largest rate.
-REST_SLIDE_RATE_TOL = 1e-9
-# Largest displacement in a time step that counts as rest, relative to that in any step.
-MIN_MOVING_STEP_RATIO = 1e-3
-
 
 def find_cycle_spans(time, period: float) -> list[tuple[float, float]]:
     """Return the start and end times [s] of the complete cycles in a window, oldest first.
@@ -71,7 +65,8 @@ def find_reversals(time, slide, rate, force, period: float, rule: str = "rate") 
     """
     spans = find_cycle_spans(time, period)
     reversals = np.full((len(spans), 4), np.nan)
-    time_tolerance = SAME_EVENT_TIME_TOL * period
+    # Largest time between two samples at the same event, in periods.
+    time_tolerance = 1e-9 * period
     for row, (begin, end) in zip(reversals, spans):
         cycle = slice(*np.searchsorted(time, [begin - time_tolerance, end + time_tolerance]))
         # The smallest displacement is the largest one of the motion -q(t).
@@ -126,7 +121,8 @@ def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple[int | None, flo
     Returns the index of the preceding sample and the position as a fraction of the step, or (None, 0) without a zero.
     """
     k = sample - 1 if first else sample
-    if abs(v[sample]) <= REST_SLIDE_RATE_TOL * max_abs(v):
+    # Largest rate at which an interface counts as at rest, relative to the largest rate.
+    if abs(v[sample]) <= 1e-9 * max_abs(v):
         return sample, 0.0
     if 0 <= k < v.size - 1 and v[k] > 0 >= v[k + 1]:
         return k, float(v[k] / (v[k] - v[k + 1]))
@@ -172,7 +168,8 @@ def _find_force_around_rest(slide, force, sample: int, value: float) -> float:
         NaN if there is no motion before or after the rest.
     """
     step = np.abs(np.diff(slide))
-    is_moving = step > MIN_MOVING_STEP_RATIO * step.max(initial=0.0)
+    # Largest displacement in a time step that counts as rest, relative to that in any step.
+    is_moving = step > 1e-3 * step.max(initial=0.0)
     is_moving &= np.maximum(
         np.abs(slide[1:] - value), np.abs(slide[:-1] - value)
     ) > MODAL_COORDINATE_ROUND_OFF * max_abs(slide)

@@ -27,7 +27,6 @@ MODAL_COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest mo
 RELATIVE_WORK_ROUND_OFF = 1e-10
 # Largest ratio of neighbouring second differences at which a curve counts as smooth.
 MAX_SMOOTH_CURVATURE_RATIO = 4.0
-PLATEAU_TOL = 1e-12  # Difference of samples that count as equal, relative to the range of all.
 
 
 def compare_friction_works(sampled_work, balance_work, exchanged_work, energy=0.0):
@@ -224,7 +223,8 @@ def interpolate_peak(samples) -> tuple[float, float]:
     """
     # A constant stretch, as of the slip of a contact that sticks, begins at its first sample, whatever its round-off.
     value = float(np.max(samples))
-    largest = int(np.argmax(samples >= value - PLATEAU_TOL * np.ptp(samples)))
+    # Difference of samples that count as equal, relative to the range of all.
+    largest = int(np.argmax(samples >= value - 1e-12 * np.ptp(samples)))
     last = len(samples) - 1
     if last < 2:
         return value, 0.0

@@ -13,15 +13,10 @@ from ..core import Outcome, max_abs
 MOTION_CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY_CLASS = 1  # Index of Outcome.STEADY in MOTION_CLASSES.
 GROWS_CLASS = 2  # Index of Outcome.GROWS in MOTION_CLASSES.
-MIN_FREE_MOTION_WINDOWS = 3  # Smallest number of windows for an estimate of the free motion.
 # Number of the last windows from which a steady amplitude is extrapolated.
 N_FINAL_WINDOWS = 5
 # Largest speed at which an interface counts as stuck, relative to the largest speed in the run.
 MAX_STUCK_SPEED_RATIO = 1e-3
-# Largest sine of the angle between two phasor differences that count as collinear.
-MAX_COLLINEAR_PHASOR_SINE = 0.02
-# Smallest decay of the slowest mode over a third of the run at which a persistent beat counts as periodic.
-MIN_PERIODIC_BEAT_DECAY = 0.1
 # Smallest remaining change of the amplitude, as a fraction of the tolerance, at which the steady estimate is
 # reported.
 MIN_REPORTED_CHANGE_FRACTION = 0.02
@@ -260,7 +255,8 @@ def sum_plane_map_remainders(p) -> np.ndarray:
     """
     d1, d2, d3 = np.diff(np.asarray(p, complex), axis=1).T
     area = (d1.conj() * d2).imag
-    is_contraction = np.abs(area) > MAX_COLLINEAR_PHASOR_SINE * np.abs(d1) * np.abs(d2)
+    # Largest sine of the angle between two phasor differences that count as collinear.
+    is_contraction = np.abs(area) > 0.02 * np.abs(d1) * np.abs(d2)
     area = np.where(is_contraction, area, 1.0)
     t = (d1.conj() * d3).imag / area
     q = (d2.conj() * d3).imag / area
@@ -365,7 +361,8 @@ def estimate_free_motion(windows: Windows, decay):
     """
     amplitude = windows.amplitude
     count = amplitude.shape[-1]
-    if count < MIN_FREE_MOTION_WINDOWS:
+    # Smallest number of windows for an estimate of the free motion.
+    if count < 3:
         return np.zeros(amplitude.shape[:-1])[()]
 
     n_third = max(1, count // 3)
@@ -376,9 +373,9 @@ def estimate_free_motion(windows: Windows, decay):
     excess = windows.excess
     decayed_fraction = 1 - np.exp(-np.asarray(decay) * n_third)
     least_excess = (1 - decayed_fraction / 2) * excess[..., previous].max(axis=-1)
-    persists = (decayed_fraction > MIN_PERIODIC_BEAT_DECAY) & (
-        excess[..., last].max(axis=-1) > least_excess
-    )
+    # Smallest decay of the slowest mode over a third of the run at which a persistent beat counts
+    # as periodic.
+    persists = (decayed_fraction > 0.1) & (excess[..., last].max(axis=-1) > least_excess)
 
     # A beat over several windows: the last difference times its ratio to the one before.
     differences = np.abs(amplitude[..., :-1] - amplitude[..., -1:])

@@ -10,8 +10,6 @@ import numpy as np
 from ..core import max_abs
 from .measures import Values
 
-# Smallest first harmonic [m s-2] of an output that counts as moving.
-MIN_MOVING_HARMONIC = 1e-4
 N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
 N_FILTER_SAMPLES = 1024  # Number of samples per cycle of the filtered signal.
 _GAUSS_RULE = np.polynomial.legendre.leggauss(4)
@@ -126,7 +124,8 @@ def make_acceleration_measures(first_harmonic: float, third_harmonic: float) -> 
     first_harmonic, third_harmonic : float
         Magnitudes of the first and the third harmonic [m s-2].
     """
-    is_moving = first_harmonic > MIN_MOVING_HARMONIC
+    # Smallest first harmonic [m s-2] of an output that counts as moving.
+    is_moving = first_harmonic > 1e-4
     return {
         "absolute_acceleration_fundamental": float(first_harmonic),
         "acceleration_distortion": third_harmonic / first_harmonic if is_moving else None,

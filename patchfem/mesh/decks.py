@@ -26,9 +26,6 @@ MESHIO_PLANE_NAMES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}
 MESHIO_LINE_NAMES = {2: "line", 3: "line3"}
 PART_KEYWORDS = ("PART", "ASSEMBLY", "INSTANCE")
 UNSUPPORTED_KEYWORDS = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY")
-# Largest ratio of the members of a set to the lines of the deck; since a set may repeat members of
-# other sets, a short deck could otherwise name any number of members
-MAX_SET_MEMBERS_PER_LINE = 64
 
 
 class Deck:
@@ -47,7 +44,9 @@ class Deck:
         self.elements: dict[int, tuple[str, list[int]]] = {}
         self.sets: dict[str, dict[str, list[int]]] = {"NSET": {}, "ELSET": {}}
         self.surfaces: dict[str, list[list[str]]] = {}
-        self.max_members = MAX_SET_MEMBERS_PER_LINE * (text.count("\n") + 1)
+        # Largest ratio of the members of a set to the lines of the deck; since a set may repeat
+        # members of other sets, a short deck could otherwise name any number of members
+        self.max_members = 64 * (text.count("\n") + 1)
         for keyword, parameters, lines in _split_blocks(text):
             self._add(keyword, parameters, lines)
 

@@ -17,10 +17,6 @@ from .patch import PatchModel
 from .source import cache_by_file, name_key
 
 SCAN_KEY = "contact.profile.scan"
-# Smallest share of the face that a scan covers; a smaller one says little about the other heights.
-MIN_COVERED_FRACTION = 0.5
-# Share of a face below which missing heights at its sides are not reported; a row of a usual scan is more.
-MAX_UNREPORTED_FRACTION = 1e-3
 
 
 def compute_face_gap(patch: PatchModel, x: np.ndarray, y: np.ndarray) -> ShapedGap:
@@ -97,7 +93,9 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
     x = scan.x - middle[0]
     y = scan.y - middle[1]
     covered = _covered_length(x, length) * _covered_length(y, width) / (length * width)
-    if covered < MIN_COVERED_FRACTION:
+    # Smallest share of the face that a scan covers; a smaller one says little about the other
+    # heights.
+    if covered < 0.5:
         size = f"{format_length(np.ptp(x))} x {format_length(np.ptp(y))}"
         face = f"{format_length(length)} x {format_length(width)}"
         raise PatchfemError(
@@ -120,7 +118,9 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
     notes = list(part.notes)
     if spikes.any():
         notes.append(f"{scan.source}: {int(spikes.sum())} heights of spikes were removed")
-    if 1 - covered > MAX_UNREPORTED_FRACTION:
+    # Share of a face below which missing heights at its sides are not reported; a row of a usual
+    # scan is more.
+    if 1 - covered > 1e-3:
         notes.append(
             f"{scan.source}: the scan does not cover {100 * (1 - covered):.2g} % of the face, at its sides; the nearest "
             "heights are taken there"

@@ -32,10 +32,6 @@ if TYPE_CHECKING:
     from .slide import PointLoad, SlidePath
     from .wear import WearModel
 
-# Smallest default [m/s] of the rest speed of bonds in a rig, v_h of eq. 2.10
-MIN_RIG_REST_SPEED = 1e-12
-MAX_EFFECTS_CHARACTERS = 160  # largest number of characters of the effects in the repr of a model
-
 
 class MeasuredFile(NamedTuple):
     """File with measured responses that are compared with the results.
@@ -88,7 +84,8 @@ class Model:
     motion: MotionFeatures | None = None
 
     def __repr__(self) -> str:
-        effects = shorten(", ".join(self.source.effects), MAX_EFFECTS_CHARACTERS)
+        # Largest number of characters of the effects in the repr of a model
+        effects = shorten(", ".join(self.source.effects), 160)
         return f"Model of {self.source.path.name}: {self.kind}; {effects}"
 
     @property
@@ -198,7 +195,8 @@ class Model:
 
     def make_bonds(self, law: Friction) -> Bonds:
         """Return the bond parameters of a law 'nonlocal' at the sliding speed of the model, from its effective keys."""
-        min_rest_speed = 0.0 if self.rig is None else MIN_RIG_REST_SPEED
+        # Smallest default [m/s] of the rest speed of bonds in a rig, v_h of eq. 2.10
+        min_rest_speed = 0.0 if self.rig is None else 1e-12
         return make_bond_parameters(law, self.speed_scale, min_rest_speed)
 
 

@@ -22,14 +22,6 @@ CURVE_POINTS_PER_CELL = 16  # number of line segments per cell that represent a 
 MIN_HEIGHT_DEVIATION = 1e-10
 # Largest standard deviation of the heights of a straight profile, relative to their range.
 MAX_STRAIGHT_PROFILE_DEVIATION = 1e-5
-# Ratio (removed slope x length of the trace) / (range of the heights) above
-# which a note reports the slope.
-MAX_UNREPORTED_SLOPE = 1e-2
-SAMPLES_PER_CUTOFF = 16  # smallest number of samples per cut-off with which a trace is filtered
-# Largest difference of equal node spacings, as a fraction of the interface length.
-NODE_SPACING_TOL = 1e-9
-# Largest relative difference of the node spacing from the averaging length
-AVERAGING_LENGTH_TOL = 1e-2
 
 
 class _LevelledProfile(NamedTuple):
@@ -149,7 +141,8 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
             "contact.asperities.cutoff",
         )
     samples = resample_evenly(trace)
-    n_samples = int(np.ceil(SAMPLES_PER_CUTOFF * samples.length / cutoff)) + 1
+    # Smallest number of samples per cut-off with which a trace is filtered
+    n_samples = int(np.ceil(16 * samples.length / cutoff)) + 1
     x = np.linspace(samples.x[0], samples.x[-1], max(samples.x.size, n_samples))
     samples_per_cutoff = cutoff * (x.size - 1) / samples.length
     line = mean_line(np.interp(x, samples.x, samples.z), samples_per_cutoff)
@@ -199,7 +192,9 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
     # A slope that was subtracted may have been a tilt that the user meant.
     slope = float(np.polyfit(raw.x, raw.z - trace.z, 1)[0])
     notes = trace.notes
-    if abs(slope) * trace.length > MAX_UNREPORTED_SLOPE * np.ptp(trace.z):
+    # Ratio (removed slope x length of the trace) / (range of the heights) above which a note
+    # reports the slope.
+    if abs(slope) * trace.length > 1e-2 * np.ptp(trace.z):
         notes = (
             *notes,
             f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
@@ -220,8 +215,10 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
 
 def _is_evenly_spaced(x, size: float) -> bool:
     """Return whether the nodes x (m,) [m] are evenly spaced by a size [m]."""
-    is_uniform = np.ptp(np.diff(x)) <= NODE_SPACING_TOL * np.ptp(x)
-    return is_uniform and abs(x[1] - x[0] - size) <= AVERAGING_LENGTH_TOL * size
+    # Largest difference of equal node spacings, as a fraction of the interface length.
+    is_uniform = np.ptp(np.diff(x)) <= 1e-9 * np.ptp(x)
+    # Largest relative difference of the node spacing from the averaging length
+    return is_uniform and abs(x[1] - x[0] - size) <= 1e-2 * size
 
 
 def _fit_spline(trace: Profile):

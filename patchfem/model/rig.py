@@ -46,13 +46,6 @@ if TYPE_CHECKING:
 
 # Largest displacement [m] up to which a motion that grows without bound is computed.
 MAX_COMPUTED_DISPLACEMENT = 1e3
-# Smallest number of drive cycles in a run whose length is given as a duration.
-MIN_RUN_CYCLES = 0.25
-# Slide of the first mode per modal coordinate, relative to the largest one of all
-# modes, below which it is round-off.
-MIN_MODE_SLIDE_FRACTION = 1e-9
-# Fraction of the squared motion of the output below which a mode moves the output by round-off only.
-MIN_MODE_OUTPUT_FRACTION = 1e-12
 
 # Tables of the joint that was bolted when the modes were measured.
 JOINT_TABLES = ("contact.", "normal.", "friction.", "structure.bonded.", "structure.interface.")
@@ -397,7 +390,8 @@ def build_drive(scene, modes: ModalBasis) -> RigDrive:
         cycles = keys.cycles
     else:
         duration = signal.duration if keys.duration is None else keys.duration
-        cycles = max(duration / signal.period, MIN_RUN_CYCLES)
+        # Smallest number of drive cycles in a run whose length is given as a duration.
+        cycles = max(duration / signal.period, 0.25)
 
     return RigDrive(
         signal=signal,
@@ -494,10 +488,14 @@ def _build_first_mode(scene, unbonded: ModalBasis, modes: ModalBasis) -> FirstMo
     if mass is None or not (structure.mode or structure.file):
         squared = np.square(unbonded.output)
         total = max(float(squared.sum()), 1e-300)
-        moves_output = squared[first] > MIN_MODE_OUTPUT_FRACTION * total
+        # Fraction of the squared motion of the output below which a mode moves the output by round-
+        # off only.
+        moves_output = squared[first] > 1e-12 * total
         mass = float(unbonded.mass / (squared[first] if moves_output else total))
     contact_mass = 0.0
-    if abs(slide[first]) > MIN_MODE_SLIDE_FRACTION * max_abs(slide):
+    # Slide of the first mode per modal coordinate, relative to the largest one of all modes, below
+    # which it is round-off.
+    if abs(slide[first]) > 1e-9 * max_abs(slide):
         contact_mass = float(unbonded.mass / max(slide[first] ** 2, 1e-300))
 
     # Both bases describe the same masses, so a least-squares fit converts the coordinates.

@@ -14,9 +14,6 @@ from ..core import Missing, array_dataclass
 from ..scene.rules.methods import find_climbed_grooves
 from .source import cache_by_file, name_key
 
-# Smallest number of steps per straight leg; the coarsest run of the
-# error estimate keeps two of them.
-MIN_STEPS_PER_LEG = 8
 # Number of steps per leg at rest; the growth of bonds at rest, eq. (2.10), is exact for any step.
 STEPS_PER_HOLD = 4
 # Number of steps per cycle that gives an error of about REFERENCE_ERROR
@@ -24,18 +21,9 @@ REFERENCE_STEPS_PER_CYCLE = 400
 # Relative error with REFERENCE_STEPS_PER_CYCLE; it falls with the square of the time step.
 REFERENCE_ERROR = 1e-3
 STEPS_PER_BOND_LENGTH = 20  # number of steps while the slide covers the length of a bond
-# Largest number of bond lengths per cycle that STEPS_PER_BOND_LENGTH resolves.
-MAX_BOND_LENGTHS = 1000
-# Smallest number of steps per cycle, which resolves the loop at any tolerance.
-MIN_STEPS_PER_CYCLE = 100
 MAX_BENCH_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
 MAX_PATH_SAMPLES = 20_000_000  # largest number of samples in a path; more take too much memory
 MAX_SLIDE_SAMPLES = 5_000_000  # largest number of samples in a slide; more take too much memory
-# Fraction of the largest load below which a load is round-off of zero, so that the contact is lost.
-MIN_LOAD_FRACTION = 1e-12
-# Smallest time between two samples in periods of the load; closer samples are the
-# same instant apart from round-off.
-MIN_SAMPLE_SPACING = 1e-9
 
 
 class SlideSamples(NamedTuple):
@@ -166,7 +154,9 @@ class SlidePath:
             Length [m] of the bonds.
         """
         legs = self.corners
-        min_steps = 0 if legs is None else MIN_STEPS_PER_LEG * (legs[0].size - 1)
+        # Smallest number of steps per straight leg; the coarsest run of the error estimate keeps
+        # two of them.
+        min_steps = 0 if legs is None else 8 * (legs[0].size - 1)
         if pinned_steps is not None:
             return 4 * ceil(max(pinned_steps, min_steps) / 4)
         per_cycle = REFERENCE_STEPS_PER_CYCLE * sqrt(REFERENCE_ERROR / tolerance)
@@ -175,9 +165,11 @@ class SlidePath:
             path = float(np.abs(np.diff(legs[1])).sum())
             cycles = max(1.0, path / (2 * float(np.ptp(legs[1]))))
             if length:
-                bond_lengths = min(path / cycles / length, MAX_BOND_LENGTHS)
+                # Largest number of bond lengths per cycle that STEPS_PER_BOND_LENGTH resolves.
+                bond_lengths = min(path / cycles / length, 1000)
                 per_cycle = max(per_cycle, STEPS_PER_BOND_LENGTH * bond_lengths)
-        per_cycle = min(max(per_cycle, MIN_STEPS_PER_CYCLE), MAX_BENCH_STEPS_PER_CYCLE)
+        # Smallest number of steps per cycle, which resolves the loop at any tolerance.
+        per_cycle = min(max(per_cycle, 100), MAX_BENCH_STEPS_PER_CYCLE)
         return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)
 
 
@@ -281,7 +273,9 @@ class PointLoad:
         load = self.load + self.amplitude * np.cos(
             2 * np.pi * self.frequency * np.asarray(time) + self.phase
         )
-        return np.where(load > MIN_LOAD_FRACTION * (self.load + self.amplitude), load, 0.0)
+        # Fraction of the largest load below which a load is round-off of zero, so that the contact
+        # is lost.
+        return np.where(load > 1e-12 * (self.load + self.amplitude), load, 0.0)
 
     def refine_samples(
         self, slide: SlidePath, time, rel_disp, steps: int
@@ -327,7 +321,9 @@ class PointLoad:
         after = np.searchsorted(time, inner)
         distance = np.minimum(inner - time[after - 1], time[after] - inner)
         distance = np.minimum(distance, np.diff(inner, prepend=-np.inf))
-        grid = np.union1d(time, inner[distance > MIN_SAMPLE_SPACING * period])
+        # Smallest time between two samples in periods of the load; closer samples are the same
+        # instant apart from round-off.
+        grid = np.union1d(time, inner[distance > 1e-9 * period])
         if slide.kind == "sine":
             return grid, slide.amplitude * np.sin(2 * np.pi * slide.frequency * grid)
         return grid, np.interp(grid, time, rel_disp)

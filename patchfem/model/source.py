@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from ..core import NotConverged, PatchfemError, array_dataclass
-from ..scene.lines import locate_key, number_items_from_one
+from ..scene.keys.lines import locate_key, number_items_from_one
 from ..scene.sets import format_values
 
 # Number of cached results of each function; results for large traces and modes take much memory.

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core import ModalBasis, PatchfemError
 from ..inputs import matrices
-from ..scene.files import UNIVERSAL_EXTENSIONS
+from ..scene.keys.tables import UNIVERSAL_EXTENSIONS
 from ..scene.rules.structure import LOCATION_KEYS, MATRIX_KEYS
 from ..structure import arrays, places, reduced, universal
 from ..structure.modes import PATCH_MOTIONS

@@ -37,7 +37,6 @@ SURFACE_KEYS = (
 )
 # Largest difference between the gaps of one patch on two meshes, relative to the range of the gap.
 GAP_DIFFERENCE_FRACTION = 1e-2
-MIN_GAP_DIFFERENCE = 1e-12  # difference between gaps [m] below which it is round-off
 # Exceptions of h5py, json and tomllib for a file of another kind.
 FOREIGN_ERRORS = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
 
@@ -84,7 +83,8 @@ class EarlierWear:
         change = interpolate_nodes(self.axes, self.gap, axes) - gap
         plane = np.column_stack([np.ones(gap.size), _list_places(axes)])
         change = max_abs(change - plane @ np.linalg.lstsq(plane, change)[0])
-        if change > GAP_DIFFERENCE_FRACTION * float(np.ptp(gap)) + MIN_GAP_DIFFERENCE:
+        # Difference between gaps [m] below which it is round-off
+        if change > GAP_DIFFERENCE_FRACTION * float(np.ptp(gap)) + 1e-12:
             raise PatchfemError(
                 f"{self.path}: the unworn surfaces of that run differ from those of this scene by "
                 f"{format_length(change, 3)}; choose a run of the same pieces, and elements of the same length if "

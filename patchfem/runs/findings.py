@@ -36,8 +36,6 @@ MAX_FIXED_STEP_HALVINGS = 4
 USE_ERROR_ADVICE = "use the value with its stated error"
 ELEMENT_SIZE_KEY = "contact.element_size"
 STEPS_PER_CYCLE_KEY = "accuracy.steps_per_cycle"
-# Ratio of a proposed limit to the expected CPU time, which varies by tens of per cent, or to the expected memory.
-LIMIT_MARGIN = 2.0
 
 
 class Missed(NamedTuple):
@@ -238,7 +236,9 @@ def _advise_limit(missed: Missed, purpose: str, cause: str = "") -> Advice:
     """
     # The proposed limit has two significant digits.
     shortage = missed.result.shortage
-    needed = LIMIT_MARGIN * shortage.needed
+    # Ratio of a proposed limit to the expected CPU time, which varies by tens of per cent, or to
+    # the expected memory.
+    needed = 2.0 * shortage.needed
     unit = 10.0 ** (floor(log10(needed)) - 1)
     limit = unit * ceil(needed / unit)
     value = format_number(limit, 2)
@@ -420,10 +420,6 @@ def _check_energy(result: Result) -> Iterator[str]:
 
 # ---- accuracy against computing time
 
-LONG_SUM_ROUND_OFF = 1e-9  # largest relative error that counts as round-off in long sums
-# Smallest ratio of the errors with finer and coarser steps at which the steps do not matter
-INEFFECTIVE_STEPS_ERROR_RATIO = 0.9
-
 
 class StepSetting(NamedTuple):
     """Number of time steps with the CPU time and the accuracy of the motion.
@@ -483,8 +479,10 @@ def compute_accuracy_curve(result) -> list[StepSetting]:
         # A coarse run that is accurate by chance gets the error of the finer one.
         distances = {name: max(change[name] + errors[name], distances[name]) for name in measures}
         settings.insert(0, make_setting(run.steps, distances))
-    has_effect = settings[0].error * INEFFECTIVE_STEPS_ERROR_RATIO >= present
-    return settings if has_effect and present >= LONG_SUM_ROUND_OFF else []
+    # Smallest ratio of the errors with finer and coarser steps at which the steps do not matter
+    has_effect = settings[0].error * 0.9 >= present
+    # Largest relative error that counts as round-off in long sums
+    return settings if has_effect and present >= 1e-9 else []
 
 
 def _select_measures(measures: Measures, step_runs) -> Measures:

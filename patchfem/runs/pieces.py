@@ -18,10 +18,6 @@ from .patch.strength import YIELDING_NEGLECTED, Strength, min_von_mises_ratio, y
 from .results.patch_rows import Arrays
 from .results.result import patch_surface
 
-# Height over that of the piece of the region at the held far face in which no yielding is looked
-# for: the stress in its corners is unbounded under a rigid holder.
-HELD_REGION_FRACTION = 0.2
-
 
 class PieceFields(NamedTuple):
     """Mesh of one piece, and its fields in f frames.
@@ -321,7 +317,9 @@ def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict[St
         piece = getattr(pieces, side)
         model = getattr(patch_model.pieces, side)
         centres = np.concatenate([piece.points[block].mean(axis=1) for block in piece.blocks])
-        free_height = (1 - HELD_REGION_FRACTION) * max_abs(piece.points[:, 1])
+        # Height over that of the piece of the region at the held far face in which no yielding is
+        # looked for: the stress in its corners is unbounded under a rigid holder.
+        free_height = (1 - 0.2) * max_abs(piece.points[:, 1])
         is_free = np.abs(centres[:, 1]) < free_height
         coating = model.coating.material if model.coating else None
 

@@ -18,11 +18,11 @@ from typing import NamedTuple, get_origin
 
 from ..core import PatchfemError
 from .keys import quantities
+from .keys.lines import split_assignment, split_key
 from .keys.lookup import LIMITS_BY_ERROR_TYPE, validate_value
 from .keys.removed import describe_removed
 from .keys.types import Key, list_keys, list_required_keys
 from .keys.values import TomlTable, TomlValue
-from .lines import split_assignment, split_key
 from .reader import is_toml, read_set_value
 from .suggestions import require_key
 
@@ -31,8 +31,6 @@ LENGTH_KEY = "drive.displacement"
 POSITIVE_KEYS = {"length": (LENGTH_KEY, "1 um..1 mm:9"), "force": ("drive.force", "1 N..100 N:9")}
 # Largest number of cases of a sweep; the hashes and columns of more cases take gigabytes.
 MAX_CASES = 3_000_000
-# Ratio of the ends of a range of positive numbers; at and above it the range is logarithmic by default.
-MIN_LOG_RATIO = 10
 # Number of significant digits of a value, so that a tenth of a range is
 # 0.1 and not 0.1000000000000001.
 SIGNIFICANT_DIGITS = 15
@@ -469,7 +467,9 @@ def _is_log(low: float, high: float, spacing: str | None) -> bool:
     """
     is_positive = low > 0 and high > 0
     if spacing is None and is_positive:
-        return _round_digits(max(low / high, high / low)) >= MIN_LOG_RATIO
+        # Ratio of the ends of a range of positive numbers; at and above it the range is logarithmic
+        # by default.
+        return _round_digits(max(low / high, high / low)) >= 10
     if spacing == "log" and not is_positive:
         raise ValueError("a logarithmic range needs both ends > 0")
     return spacing == "log"

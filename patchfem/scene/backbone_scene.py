@@ -20,8 +20,6 @@ ASSUMED_MASS = "1 kg"  # modal mass for the modes of a scene without [structure]
 # Drive that a rig must have in a scene. No result of a backbone depends on it.
 UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
 KEYS_OF_MODES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
-# Keys of [structure] on what is subtracted from its modes
-SUBTRACTED_KEYS = ("measured_stiffness", "measured_stiffness_error", "measured_damper")
 # Names of modes that are given without names
 MODE_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth")
 
@@ -165,7 +163,8 @@ class BackboneTables:
         self.assumes_mass = "moving_mass" not in structure
         structure.setdefault("moving_mass", ASSUMED_MASS)
         # The key `measured` of the scene and the stiffness subtracted from its modes belong to the modes that are replaced.
-        for name in SUBTRACTED_KEYS:
+        # Keys of [structure] on what is subtracted from its modes
+        for name in ("measured_stiffness", "measured_stiffness_error", "measured_damper"):
             structure.pop(name, None)
         structure["measured"] = "stuck" if self.has_frequencies_of_stuck_modes else "free"
         structure["mode"] = [_write_mode(k, mode) for k, mode in enumerate(self.modes)]

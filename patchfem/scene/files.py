@@ -9,9 +9,6 @@ from .keys.tables import Tables
 from .keys.types import Table, list_keys
 from .rules.scene_draft import SceneDraft
 
-# File name extensions of universal files, by which every reader knows them
-UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
-
 
 def list_named_files(tables: Any) -> list[tuple[str, str]]:
     """Return (dotted key, file) for every file that a scene, or its tables, names.

@@ -14,7 +14,6 @@ from .keys.types import advise_on_name
 from .starting import TEMPLATE_FOLDER
 
 GUIDE_SECTION = 'patchfem/scene/guide/friction.md, "Which law for my joint?"'
-COMMENT_WIDTH = 120  # width of a scene file in characters
 NOTHING_KNOWN = "nothing"  # word of KNOWLEDGE_OF_JOINT that excludes the others
 
 
@@ -156,8 +155,7 @@ def compose_scene(choice: Choice) -> str:
     """Return the scene of the chosen law, with the sentences of `describe_choice` as comments at its head."""
     lines = []
     for sentence in describe_choice(choice):
-        lines += textwrap.wrap(
-            sentence, COMMENT_WIDTH, initial_indent="# ", subsequent_indent="#   "
-        )
+        # Width of a scene file in characters
+        lines += textwrap.wrap(sentence, 120, initial_indent="# ", subsequent_indent="#   ")
     scene = (TEMPLATE_FOLDER / f"{choice.row.scene}.toml").read_text(encoding="utf-8")
     return "\n".join(lines) + "\n\n" + scene

@@ -15,8 +15,8 @@ import numpy as np
 from ..effects import find_waveform
 from .files import list_named_files, require_files
 from .keys.contact import MAX_ANGLE_BETWEEN_PIECES
+from .keys.lines import find_scene_value
 from .keys.types import KeyValue, Table
-from .lines import find_scene_value
 from .reader import apply_set
 from .rules.contact import find_max_load
 from .rules.outlines import find_flat_length
@@ -26,9 +26,6 @@ from .rules.together import holds
 from .rules.view import TableView
 from .scene import Scene, attach_written, finish_scene
 
-# Largest number of tables that a BaseScene caches, so that the cases of
-# a sweep do not read them again.
-MAX_CACHED_TABLES = 4096
 # Keys of a rig with sinusoidal base motion, or of a pressed patch, each with two values in SI between which no rule or
 # remark depends on its value.
 PLAIN_KEYS = {
@@ -98,7 +95,9 @@ class BaseScene:
         scene = require_files(finish_scene(draft, base.path, base.text, (*base.sets, *sets)))
         scene = attach_written(scene, known=base.written or (None if base.sets else base))
         # No SceneError was raised, so these tables are valid and can be used again.
-        if len(self._tables) < MAX_CACHED_TABLES:
+        # Largest number of tables that a BaseScene caches, so that the cases of a sweep do not read
+        # them again.
+        if len(self._tables) < 4096:
             for name, values in draft.raw.items():
                 self._tables.setdefault((name, repr(values)), getattr(draft.tables, name))
         return scene

@@ -5,6 +5,13 @@ from __future__ import annotations
 import re
 import tomllib
 
+from .keys.lines import (
+    find_item,
+    list_item_names,
+    number_items_from_one,
+    split_assignment,
+    split_key,
+)
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
     describe_error,
@@ -24,13 +31,6 @@ from .keys.types import (
     list_required_keys,
 )
 from .keys.values import TomlTable, TomlValue
-from .lines import (
-    find_item,
-    list_item_names,
-    number_items_from_one,
-    split_assignment,
-    split_key,
-)
 from .rules.scene_draft import SceneDraft
 from .suggestions import describe_unknown_key
 

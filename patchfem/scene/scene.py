@@ -16,8 +16,8 @@ from . import assignments
 from .defaults import complete_tables
 from .files import list_absent_files, rename_files, require_files
 from .keys import tables
+from .keys.lines import find_scene_value, locate_key, split_assignment
 from .keys.values import TomlValue
-from .lines import find_scene_value, locate_key, split_assignment
 from .reader import apply_set, read_tables
 from .rules.check import check_scene
 from .rules.scene_draft import SceneDraft, SceneError

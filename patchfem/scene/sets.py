@@ -14,7 +14,6 @@ from .rules.scene_draft import SceneError
 
 # Value of TOML, a number of another class, or a NumPy scalar or array, as a user of Python writes it.
 PythonValue: TypeAlias = "TomlValue | Real | Iterable[PythonValue]"
-MAX_JOINT_LENGTH = 1.0  # largest length of a joint [m]; of its lengths, only a radius can be larger
 
 
 def format_assignments(sets: dict[str, PythonValue]) -> tuple[str, ...]:
@@ -106,7 +105,8 @@ def find_oversized_lengths(
             mistakes += find_oversized_lengths(value, patch_length, f"{key}.")
         elif _is_length(key, value):
             is_beside = patch_length is not None and not key.startswith("contact.")
-            limit = patch_length if is_beside else MAX_JOINT_LENGTH
+            # Largest length of a joint [m]; of its lengths, only a radius can be larger
+            limit = patch_length if is_beside else 1.0
             if abs(value) > limit:
                 mistakes.append(
                     f"--set: {key}: {value:g} without a unit means {value:g} m, which is longer than "

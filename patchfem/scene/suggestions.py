@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ..effects import join_words
 from .keys.choices import find_selectors, split_keys
+from .keys.lines import split_key
 from .keys.lookup import find_key, validate_values
 from .keys.removed import describe_removed
 from .keys.tables import Tables
@@ -19,13 +20,11 @@ from .keys.types import (
     list_required_keys,
 )
 from .keys.values import TomlTable, TomlValue
-from .lines import split_key
 
 # Rating of a table whose name is similar to an unknown key. A table that knows all keys inside has 1.
 SIMILAR_NAME_RATING = 0.75
 # Rating of a table with the name of an unknown key, above all other ratings
 SAME_NAME_RATING = 2.0
-MIN_TABLE_RATING = 0.5  # rating above which a table is suggested
 
 
 class UnknownKey(NamedTuple):
@@ -225,7 +224,8 @@ def _suggest_table(model: type[Table], key: str, value: TomlValue) -> str:
         return known + SIMILAR_NAME_RATING * (name in similar) + SAME_NAME_RATING * is_same
 
     best = max((*similar, *tables), key=rate, default="")
-    return best if best and rate(best) > MIN_TABLE_RATING else ""
+    # Rating above which a table is suggested
+    return best if best and rate(best) > 0.5 else ""
 
 
 def _list_similar(key: str, names: Collection[str]) -> list[str]:

@@ -18,10 +18,6 @@ MIN_SAMPLES_PER_CYCLE = 20
 MAX_STORED_SAMPLES = 20_000
 # Largest number of samples from before the last cycles, which limits memory and file size
 MAX_EARLY_SAMPLES = 400_000
-# Tolerance on times as a fraction of a period; it exceeds the round-off after many cycles
-PERIOD_TIME_TOL = 1e-6
-# Largest denominator of a frequency [Hz]; finer differences of frequencies do not matter
-MAX_FREQUENCY_DENOMINATOR = 10**6
 
 
 class DriveKeys(NamedTuple):
@@ -156,7 +152,8 @@ def count_beat_cycles(frequencies) -> float:
     denominator.
     """
     exact = [Fraction(f) for f in frequencies]
-    fractions = [f.limit_denominator(MAX_FREQUENCY_DENOMINATOR) or f for f in exact]
+    # Largest denominator of a frequency [Hz]; finer differences of frequencies do not matter
+    fractions = [f.limit_denominator(10**6) or f for f in exact]
     denominator = lcm(*(fraction.denominator for fraction in fractions))
     numerators = [int(fraction * denominator) for fraction in fractions]
     return numerators[0] / gcd(*numerators)
@@ -180,7 +177,8 @@ def count_cycles(time, drive) -> int:
 
 def has_full_cycle(span: float, drive) -> bool:
     """Return whether a time span [s] contains a full drive cycle, which a friction loop requires."""
-    return span > drive.period * (1 - PERIOD_TIME_TOL)
+    # Tolerance on times as a fraction of a period; it exceeds the round-off after many cycles
+    return span > drive.period * (1 - 1e-6)
 
 
 def is_release(drive) -> bool:

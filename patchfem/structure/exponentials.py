@@ -2,8 +2,6 @@
 
 import numpy as np
 
-TAYLOR_DEGREE = 18  # degree whose remainder is below round-off for matrices of norm 1
-
 
 def exponential(matrix, time, powers) -> np.ndarray:
     """Return the matrix exponential exp(time matrix) (..., k, k) for states (k,) of units [s^-powers].
@@ -28,7 +26,8 @@ def exponential(matrix, time, powers) -> np.ndarray:
     exponent = exponent / 2**n_squares
     identity = np.eye(powers.size)
     result = identity
-    for order in range(TAYLOR_DEGREE, 0, -1):
+    # Degree whose remainder is below round-off for matrices of norm 1
+    for order in range(18, 0, -1):
         result = identity + exponent @ result / order
     for _ in range(n_squares):
         result = result @ result

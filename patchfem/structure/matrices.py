@@ -20,15 +20,6 @@ EIGENVALUE_TOL = 16 * np.finfo(float).eps
 # Largest entry of a projected damping matrix that is set to zero as round-off, relative to its
 # scale
 ZERO_DAMPING_ENTRY_TOL = 1e-12
-# Most negative eigenvalue of a damping matrix that is accepted as round-off of a singular matrix,
-# relative to the largest eigenvalue
-MIN_DAMPING_EIGENVALUE = -1e-9
-# Largest relative difference of natural frequencies that count as equal; the shapes of such modes
-# may be rotated
-EQUAL_MODES_TOL = 1e-11
-# Smallest relative motion of the output in a mode; a smaller one is round-off, because the output
-# lies at a node of the mode
-MIN_OUTPUT_MOTION = 1e-9
 
 
 def build_basis(
@@ -271,7 +262,9 @@ def _project_damping_matrix(phi, C) -> np.ndarray:
     size = np.abs(phi)
     D = trim_round_off(phi.T @ C @ phi, size.T @ np.abs(C) @ size)
     values = eigh(D, eigvals_only=True)
-    if values[0] < MIN_DAMPING_EIGENVALUE * max(abs(values[-1]), abs(values[0])):
+    # Most negative eigenvalue of a damping matrix that is accepted as round-off of a singular
+    # matrix, relative to the largest eigenvalue
+    if values[0] < -1e-9 * max(abs(values[-1]), abs(values[0])):
         raise PatchfemError(
             "C adds energy: for one motion the damping divided by the mass is "
             f"{values[0]:.3g} 1/s; dampers >= 0 are needed"
@@ -299,7 +292,9 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple[np.ndarray, np.ndarray]:
     """
     first = 0
     for last in range(1, len(omega) + 1):
-        if last < len(omega) and omega[last] - omega[first] <= EQUAL_MODES_TOL * omega[last]:
+        # Largest relative difference of natural frequencies that count as equal; the shapes of such
+        # modes may be rotated
+        if last < len(omega) and omega[last] - omega[first] <= 1e-11 * omega[last]:
             continue
         block = D[first:last, first:last]
         if last - first > 1 and np.abs(block).sum() > np.abs(np.diag(block)).sum():
@@ -320,5 +315,7 @@ def _find_shape_signs(phi, output) -> np.ndarray:
     """
     motion = output @ phi
     largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]
-    is_node = np.abs(motion) <= MIN_OUTPUT_MOTION * (np.abs(output) @ np.abs(phi))
+    # Smallest relative motion of the output in a mode; a smaller one is round-off, because the
+    # output lies at a node of the mode
+    is_node = np.abs(motion) <= 1e-9 * (np.abs(output) @ np.abs(phi))
     return np.where(np.where(is_node, largest, motion) < 0, -1.0, 1.0)

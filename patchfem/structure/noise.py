@@ -13,7 +13,6 @@ from ..core import PatchfemError, array_dataclass
 from .drive_sizes import DriveKeys
 from .drives import RecordedDrive
 
-NOISE_ROWS_PER_PERIOD = 8  # number of rows of the record per period of the highest frequency
 # Smallest number of spectral lines of a record; the values of a record with fewer are not Gaussian
 MIN_SPECTRAL_LINES = 8
 # Tolerance on the number of the spectral line at each end of the band, in line spacings
@@ -79,7 +78,8 @@ def draw_random_record(
         )
 
     # Spectral lines in the band.
-    n_rows = int(np.ceil(duration * NOISE_ROWS_PER_PERIOD * high))
+    # Number of rows of the record per period of the highest frequency
+    n_rows = int(np.ceil(duration * 8 * high))
     step = duration / n_rows
     first_line = int(np.ceil(low * duration - SPECTRAL_LINE_TOL))
     lines = np.arange(first_line, int(high * duration + SPECTRAL_LINE_TOL) + 1)

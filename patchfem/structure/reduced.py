@@ -24,21 +24,8 @@ from ..elasticity.lapack import use_one_blas_thread
 from ..elasticity.sparse_factor import SparseFactor, ZeroEnergyMotion
 from . import masses, matrices
 
-# Largest number of coordinates for a dense eigensolution; larger structures use Lanczos iteration
-MAX_DENSE_COORDINATES = 600
-# Number of computed modes beyond twice the retained number, because the run for the error estimate
-# retains more modes
-N_EXTRA_MODES = 4
 # Round-off of an entry of a projected matrix, relative to the sum of the magnitudes of its terms
 PROJECTION_TOL = 64 * np.finfo(float).eps
-# Shift of the stiffness of an unconstrained structure, relative to the largest ratio of stiffness
-# to mass; without it K is singular
-STIFFNESS_SHIFT_FRACTION = 1e-9
-# Smallest pivot of a stiffness matrix relative to its diagonal entry; a smaller one belongs to a
-# rigid motion
-MIN_PIVOT_RATIO = 1e-12
-# Smallest ratio of mass to stiffness of a motion that has mass, relative to the largest ratio
-MIN_MASS_TO_STIFFNESS_FRACTION = 1e-14
 # Smallest squared frequency of an elastic mode, relative to the largest one and per coordinate; a
 # smaller one belongs to a rigid motion
 MIN_ELASTIC_FREQUENCY_FRACTION = 1e-12
@@ -155,7 +142,9 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
     )
 
     # More modes are computed than are kept, because a run with all of them gives the error of a run with the kept ones.
-    count = 2 * modes + N_EXTRA_MODES
+    # Number of computed modes beyond twice the retained number, because the run for the error
+    # estimate retains more modes
+    count = 2 * modes + 4
     with use_one_blas_thread():
         shapes, computed = compute_shapes(K.tocsc(), M.tocsc(), np.asarray(boundary), count, load)
         stiffness = _project(K, shapes, PROJECTION_TOL)
@@ -214,7 +203,9 @@ def _refuse_indefinite(matrix, name: str) -> None:
 def _factorize(K) -> SparseFactor | None:
     """Factorize a stiffness matrix K, or return None if it has rigid-body modes."""
     try:
-        return SparseFactor(K, MIN_PIVOT_RATIO)
+        # Smallest pivot of a stiffness matrix relative to its diagonal entry; a smaller one belongs
+        # to a rigid motion
+        return SparseFactor(K, 1e-12)
     except ZeroEnergyMotion:
         return None
     except NotConverged:
@@ -239,7 +230,9 @@ def _compute_lowest_modes(
         return np.zeros(0), np.zeros((n, 0))
 
     # Shift-invert Lanczos iteration with a fixed start, so that a run can be repeated.
-    if n > MAX_DENSE_COORDINATES and count <= n // 4:
+    # Largest number of coordinates for a dense eigensolution; larger structures use Lanczos
+    # iteration
+    if n > 600 and count <= n // 4:
         operator = LinearOperator(K.shape, matvec=factor.solve, dtype=float)
         start = np.random.default_rng(1).standard_normal(n)
         squares, shapes = eigsh(K, count, M, sigma=-shift, OPinv=operator, v0=start)
@@ -255,7 +248,8 @@ def _compute_lowest_modes(
     # The second matrix of eigh must be positive definite; M may be singular, so M v = mu K v is
     # solved.
     inverse_squares, shapes = eigh(M.toarray(), (shifted + shifted.T) / 2)
-    has_mass = inverse_squares > MIN_MASS_TO_STIFFNESS_FRACTION * inverse_squares.max(initial=0.0)
+    # Smallest ratio of mass to stiffness of a motion that has mass, relative to the largest ratio
+    has_mass = inverse_squares > 1e-14 * inverse_squares.max(initial=0.0)
     lowest = np.flatnonzero(has_mass)[::-1][:count]
     inverse_squares = inverse_squares[lowest]
     shapes = shapes[:, lowest] / np.sqrt(inverse_squares)
@@ -327,7 +321,9 @@ def _compute_free_interface_shapes(
         mass = M.diagonal()
         has_mass = mass > 0
         largest = (K.diagonal()[has_mass] / mass[has_mass]).max(initial=0.0)
-        shift = STIFFNESS_SHIFT_FRACTION * float(largest)
+        # Shift of the stiffness of an unconstrained structure, relative to the largest ratio of
+        # stiffness to mass; without it K is singular
+        shift = 1e-9 * float(largest)
         factor = _factorize((K + shift * M).tocsc()) if shift else None
     if factor is None:
         raise PatchfemError(

@@ -7,13 +7,6 @@ import numpy as np
 from ..core import PatchfemError, array_dataclass, frozen_array
 from .profile import Profile, robust_deviation
 
-SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard deviations
-MAX_SPIKE_POINTS = 12  # number of points of a spike; a larger group is a feature of the surface
-SPIKE_WINDOW_SIDE = 5  # side of the square of the median
-# The measured points of a scan lie in one line, which determines no plane, if the smallest singular value of their
-# coordinates (1, x, y) is below this fraction of the largest one. Such a value is round-off.
-COLLINEAR_POINTS_TOL = 1e-6
-
 
 @array_dataclass
 class Areal:
@@ -56,15 +49,18 @@ def find_scan_spikes(scan: Areal) -> np.ndarray:
     from scipy import ndimage
 
     filled = fill_nearest(scan.z)
-    distance = np.abs(filled - ndimage.median_filter(filled, SPIKE_WINDOW_SIDE))
+    # Side of the square of the median
+    distance = np.abs(filled - ndimage.median_filter(filled, 5))
     spikes = np.zeros(filled.shape, bool)
     if not distance.any():
         return spikes
     deviation = robust_deviation(distance[distance > 0])
-    for threshold in SPIKE_THRESHOLDS:
+    # |height - median of 5 x 5| in standard deviations
+    for threshold in (10.0, 40.0, 160.0):
         groups, count = ndimage.label(distance > threshold * deviation, np.ones((3, 3)))
         sizes = np.bincount(groups.ravel(), minlength=count + 1)
-        spikes |= (sizes <= MAX_SPIKE_POINTS)[groups] & (groups > 0)
+        # Number of points of a spike; a larger group is a feature of the surface
+        spikes |= (sizes <= 12)[groups] & (groups > 0)
     return spikes & ~scan.missing
 
 
@@ -78,9 +74,10 @@ def level(surface: Profile | Areal) -> Profile | Areal:
     # Positions from -1 to 1 make the rank independent of units.
     unit = [2 * (axis - axis[0]) / np.ptp(axis) - 1 for axis in axes]
     base = np.array([np.broadcast_to(part, known.shape) for part in (1.0, *unit)])
-    factors, _, rank, _ = np.linalg.lstsq(
-        base[:, known].T, surface.z[known], rcond=COLLINEAR_POINTS_TOL
-    )
+    # The measured points of a scan lie in one line, which determines no plane, if the smallest
+    # singular value of their coordinates (1, x, y) is below this fraction of the largest one. Such
+    # a value is round-off.
+    factors, _, rank, _ = np.linalg.lstsq(base[:, known].T, surface.z[known], rcond=1e-6)
     if rank < len(base):
         needs = ("a line needs two", "a plane needs three that do not lie on one straight line")
         raise PatchfemError(f"{surface.source}: {known.sum()} heights; {needs[known.ndim - 1]}")

@@ -16,10 +16,8 @@ HARMLESS_NOTE_PARTS = (
     "is rounded to",
     "heights of spikes were removed",
 )
-N_POSITION_DIGITS = 11  # number of digits of x [m] in notes, which state no round-off
 # Largest number of elements that a trace may lack at either end, with round-off.
 MAX_MISSING_END_ELEMENTS = 0.5000001
-MAX_STEP_ELEMENTS = 1.5  # largest sample spacing in elements without a note
 
 
 def is_note(text: str) -> bool:
@@ -51,7 +49,8 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
     notes = profile.notes
     if not _covers(known, x):
         shift = float(x[0] + x[-1] - known[0] - known[-1]) / 2
-        rounded = np.round([known[0], known[-1], shift], N_POSITION_DIGITS)
+        # Number of digits of x [m] in notes, which state no round-off
+        rounded = np.round([known[0], known[-1], shift], 11)
         first, last, added = map(format_length, rounded.tolist())
         notes += (
             f"{profile.source}: x runs from {first} to {last} in the file and does not cover the patch, from "
@@ -68,7 +67,8 @@ def place_over_patch(profile: Profile, x: np.ndarray) -> Profile:
 
     step = float(np.median(np.diff(places[is_kept])))
     element = float(np.diff(x).max())
-    if step > MAX_STEP_ELEMENTS * element:
+    # Largest sample spacing in elements without a note
+    if step > 1.5 * element:
         notes += (
             f"{profile.source}: samples lie {format_length(step)} apart, but elements are only "
             f"{format_length(element)} long; the surface between samples is interpolated",

@@ -13,16 +13,12 @@ MEDIAN_WINDOW_SAMPLES = 7
 SPECK_WINDOWS_SAMPLES = (15, 31)
 # Smallest height of a spike in robust standard deviations; heights of rough surfaces stay within 6.
 MIN_SPIKE_DEVIATIONS = 8.0
-# Height in robust standard deviations down to which a speck is removed,
-# so that its foot goes with it.
-SPECK_FOOT_DEVIATIONS = 3.0
 # Ratio of the standard deviation to the median absolute deviation of normal values.
 MAD_TO_DEVIATION = 1.4826
 # Number of medians that are computed at a time, which limits the memory
 MEDIANS_PER_CHUNK = 131_072
 # Largest number of samples in a resampled trace, which limits the memory
 MAX_TRACE_SAMPLES = 2_097_152
-EVEN_STEPS_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trace
 
 
 @array_dataclass
@@ -69,7 +65,8 @@ def resample_evenly(profile: Profile) -> Profile:
     """
     profile = _bridge(profile, ~profile.missing)
     steps = np.diff(profile.x)
-    if np.ptp(steps) <= EVEN_STEPS_TOL * steps.mean():
+    # Largest relative range of the steps of an evenly sampled trace
+    if np.ptp(steps) <= 1e-6 * steps.mean():
         return profile
     length = profile.length
     step = max(float(np.percentile(steps, 10)), length / MAX_TRACE_SAMPLES)
@@ -215,7 +212,9 @@ def remove_spikes(profile: Profile) -> Profile:
     removed = is_spike.copy()
     for window in (MEDIAN_WINDOW_SAMPLES, *SPECK_WINDOWS_SAMPLES):
         distance, deviation = _compare_with_neighbours(z, window)
-        for first, last in find_runs(np.abs(distance) > SPECK_FOOT_DEVIATIONS * deviation):
+        # Height in robust standard deviations down to which a speck is removed, so that its foot
+        # goes with it.
+        for first, last in find_runs(np.abs(distance) > 3.0 * deviation):
             group = slice(first, last + 1)
             walls = np.diff(z[max(first - 2, 0) : last + 3])
             has_walls = min(walls.max(initial=0.0), -walls.min(initial=0.0)) > min_wall

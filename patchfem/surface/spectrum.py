@@ -11,7 +11,6 @@ from .profile import Profile, resample_evenly
 
 # Wavelengths [m] of `band_amplitude`: the 80 um waves of the 1985 report
 WAVE_BAND = (60e-6, 110e-6)
-N_SMOOTHED_WAVES = 9  # number of neighbouring waves whose mean is the density at their middle
 MIN_ELEMENTS_PER_WAVE = 2  # number of elements per wave; nodes cannot represent a shorter wave
 # Fraction of the rms height in waves that are too short for the elements,
 # above which a warning is given.
@@ -37,7 +36,8 @@ class WaveSpectrum(NamedTuple):
         """One-sided power spectral density (n,) [m3], smoothed."""
         from scipy.ndimage import uniform_filter1d
 
-        return uniform_filter1d(self.power, N_SMOOTHED_WAVES, mode="nearest") * self.waves[0]
+        # Number of neighbouring waves whose mean is the density at their middle
+        return uniform_filter1d(self.power, 9, mode="nearest") * self.waves[0]
 
     def measure_band(self) -> float:
         """Return the amplitude [m] of a sine whose mean square is that of all waves with lengths in `WAVE_BAND`."""

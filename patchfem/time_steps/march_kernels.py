@@ -74,6 +74,8 @@ MAX_STALLS = 4  # iterations that do not halve the smallest residual, after whic
 # Largest residual of such a step relative to RESIDUAL, and that of lists, whose means have quadrature errors
 STALLED = 1e3
 LISTS_STALLED = 1e5
+# Residual of lists relative to RESIDUAL: 1e-9 of the force, below the errors by which strips are joined
+LISTS_RESIDUAL = 1e3
 LIST_CUTS = 30  # trials of a line search for lists
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
@@ -340,12 +342,12 @@ def slip_rigidly(system, p, block):
 def write_residual(system, level):
     """Compute the residuals [N] of port forces and shear coordinates; return the largest one over its tolerance.
 
-    `ports.vector` receives first the residuals of the ports, then those of the shear coordinates.
+    `ports.newton.residual` receives first the residuals of the ports, then those of the shear coordinates.
     """
     ports = system.ports
     points = system.points
     moves = ports.values
-    vector = ports.vector
+    vector = ports.newton.residual
     n_ports = moves.shape[1]
     size = system.options.scale
     for p in range(n_ports):
@@ -390,7 +392,17 @@ def count_lanes(points, block):
 
 @njit(**NJIT_CALL)
 def sum_points(points, block, row):
-    """Return the sum over a block of a row of `Value`."""
+    """Return the sum over the points of a block of one of their values.
+
+    Parameters
+    ----------
+    points : step_rows_kernels.Points
+        Points.
+    block : int
+        Number of the block.
+    row : Value
+        Row of the values.
+    """
     values = points.values[block]
     total = 0.0
     for j in range(count_lanes(points, block)):
@@ -425,7 +437,7 @@ def sum_shape(points, k, block, row):
 
 @njit(**NJIT_CALL)
 def write_matrix(system, level, step):
-    """Write the Jacobian of the residuals of a step to `ports.matrix`.
+    """Write the Jacobian of the residuals of a step to `ports.newton.matrix`.
 
     A force at port k reduces the increment of port p by C_pk and its velocity at the end of the step by G_pk.
 
@@ -441,7 +453,7 @@ def write_matrix(system, level, step):
     ports = system.ports
     points = system.points
     moves = ports.values
-    matrix = ports.matrix
+    matrix = ports.newton.matrix
     compliance = ports.compliance[level]
     n_ports = moves.shape[1]
     matrix[:] = 0.0
@@ -585,8 +597,9 @@ def solve_forces(system, level, step):
     has_lists = system.options.has_lists > 0
     has_potential = has_lists or (is_shortest(system, level) and not system.options.has_events)
     stalled = LISTS_STALLED if has_lists else STALLED
+    solved = LISTS_RESIDUAL if has_lists else 1.0
     for _ in range(MAX_NEWTON_ITERATIONS):
-        if residual <= 1.0 or (n_stalls >= MAX_STALLS and residual <= stalled):
+        if residual <= solved or (n_stalls >= MAX_STALLS and residual <= stalled):
             return True
         system.totals[Total.ITERATIONS] += 1
         if not find_newton_step(system, level, step):
@@ -609,7 +622,7 @@ def solve_forces(system, level, step):
             if change < 0:
                 return False
             residual = max(write_residual(system, level), change / LOAD_RESIDUAL)
-            if residual <= 1.0:
+            if residual <= solved:
                 break
             if has_potential:
                 slope = find_potential_slope(system, level)
@@ -627,7 +640,7 @@ def solve_forces(system, level, step):
 
 @njit(**NJIT_CALL)
 def find_newton_step(system, level, step):
-    """Write Newton's step to `ports.step`; return whether the Jacobian is regular.
+    """Write Newton's step to `ports.newton.step`; return whether the Jacobian is regular.
 
     Parameters
     ----------
@@ -640,9 +653,9 @@ def find_newton_step(system, level, step):
     """
     ports = system.ports
     write_matrix(system, level, step)
-    for i in range(ports.vector.size):
-        ports.step[i] = ports.vector[i]
-    return solve_linear(ports.matrix, ports.step, ports.vector.size)
+    for i in range(ports.newton.residual.size):
+        ports.newton.step[i] = ports.newton.residual[i]
+    return solve_linear(ports.newton.matrix, ports.newton.step, ports.newton.residual.size)
 
 
 @njit(**NJIT_CALL)
@@ -658,9 +671,9 @@ def find_potential_slope(system, level):
     slope = 0.0
     for p in range(n_ports):
         for k in range(n_ports):
-            slope += ports.vector[p] * compliance[0, p, k] * ports.step[k]
-    for k in range(n_ports, ports.vector.size):
-        slope -= ports.vector[k] * ports.step[k]
+            slope += ports.newton.residual[p] * compliance[0, p, k] * ports.newton.step[k]
+    for k in range(n_ports, ports.newton.residual.size):
+        slope -= ports.newton.residual[k] * ports.newton.step[k]
     return slope
 
 
@@ -740,7 +753,7 @@ def is_held(points, p):
 @njit(**NJIT_CALL)
 def is_shortest(system, level):
     """Return whether a step of this level cannot be halved."""
-    return level == system.structure.responses.shape[0] - 1
+    return level == system.structure.responses.motion.shape[0] - 1
 
 
 @njit(**NJIT_CALL)
@@ -837,12 +850,12 @@ def release_port(system, drive, is_last):
     ports = system.ports
     # Row 2 of the state is that at the end of the trial step, and so are the forces of the points.
     for p in range(ports.values.shape[1]):
-        ports.vector[p] = 0.0
+        ports.newton.residual[p] = 0.0
         for block in range(points.first[p], points.first[p + 1]):
             if points.law[block] == Law.COULOMB:
-                ports.vector[p] += find_rigid_force(points, block)
+                ports.newton.residual[p] += find_rigid_force(points, block)
             else:
-                ports.vector[p] += sum_points(points, block, Value.END)
+                ports.newton.residual[p] += sum_points(points, block, Value.END)
     normal.find_holds(system, system.state[2], drive)
     worst = -1
     largest = 1.0

@@ -73,8 +73,8 @@ def add_residuals(system):
         moves[Port.INCREMENT, pitch],
         ports.contact[2:11],
     )
-    ports.vector[heave] += ports.contact[2]
-    ports.vector[pitch] += ports.contact[3]
+    ports.newton.residual[heave] += ports.contact[2]
+    ports.newton.residual[pitch] += ports.contact[3]
     return abs(ports.contact[2])
 
 
@@ -89,7 +89,7 @@ def add_slopes(system, level):
         p = heave if i == 0 else pitch
         for k in range(ports.values.shape[1]):
             change = ports.contact[7 + 2 * i] * compliance[0, heave, k]
-            ports.matrix[p, k] -= change + ports.contact[8 + 2 * i] * compliance[0, pitch, k]
+            ports.newton.matrix[p, k] -= change + ports.contact[8 + 2 * i] * compliance[0, pitch, k]
 
 
 @njit(**NJIT_CALL)
@@ -99,7 +99,7 @@ def find_holds(system, state, drive):
     Parameters
     ----------
     system : march_rows_kernels.System
-        Arrays of the march; `ports.vector` has the forces of the points of each port.
+        Arrays of the march; `ports.newton.residual` has the forces of the points of each port.
     state : (2 n,) array
         Modal coordinates and velocities.
     drive : float
@@ -112,8 +112,8 @@ def find_holds(system, state, drive):
     up = sum_products(ports.rows[heave], state[:n])
     turn = sum_products(ports.rows[pitch], state[:n])
     energy = compute_energy(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn)
-    ports.vector[heave] += energy.heave_slope
-    ports.vector[pitch] += energy.rotation_slope
+    ports.newton.residual[heave] += energy.heave_slope
+    ports.newton.residual[pitch] += energy.rotation_slope
     solve_holds(system, state, drive)
 
 

@@ -1,7 +1,5 @@
 """Arrays of a march of contact points, and the states that are read from it."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
@@ -15,9 +13,11 @@ from .march_rows_kernels import (
     LOWER,
     RESULTANT,
     Flank,
+    Newton,
     Options,
     Port,
     Ports,
+    Responses,
     Shear,
     Structure,
     System,
@@ -38,22 +38,6 @@ MIN_RANK = (
 TABLE_DISTANCE = 100.0
 END_MARGIN = 1e-9
 N_EVENT_LEVELS = 20  # the same with rigid friction, whose stops and releases are located by halving
-
-
-class Responses(NamedTuple):
-    """Motion, viscous loss and work of the drive in steps of several lengths, in the rows of `march_rows_kernels.Structure`.
-
-    N = 3 n + 3 inputs: 2 n coordinates and velocities, the drive with two derivatives, and n constant modal forces over
-    mass.
-
-    - motion: (levels, 2 n, N) motion at the end of a step per input
-    - loss: (levels, N, N) viscous loss [J] as a quadratic form of the inputs
-    - work: (levels, 3, N) work of the drive [J] as a bilinear form of the drive and the inputs
-    """
-
-    motion: np.ndarray
-    loss: np.ndarray
-    work: np.ndarray
 
 
 def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
@@ -164,13 +148,11 @@ def make_system(
         rows @ rows.T / mass,
         _find_redundant(rows, contact),
         _make_port_values(contact, len(rows)),
-        np.zeros((size, size)),
-        np.zeros(size),
-        np.zeros(size),
+        Newton(np.zeros((size, size)), np.zeros(size), np.zeros(size)),
         press,
     )
     structure = Structure(
-        *responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(3 * n + 3)
+        responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(3 * n + 3)
     )
     options = Options(
         mass,

@@ -221,8 +221,6 @@ class March:
         self.system = system._replace(
             structure=system.structure._replace(
                 responses=fresh.structure.responses,
-                loss=fresh.structure.loss,
-                work=fresh.structure.work,
             ),
             ports=system.ports._replace(compliance=fresh.ports.compliance),
             options=system.options._replace(step=float(step)),

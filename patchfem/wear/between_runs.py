@@ -12,12 +12,8 @@ from ..formatting import format_length
 from ..model.wear import GAP_DIFFERENCE_FRACTION, LOADING_KEYS
 from ..surface.quantity import Quantity
 
-# Width of the worn part divided by that of its floor, the deepest fifth
-WORN_WIDTH_OVER_FLOOR_WIDTH = 5
 # Number of points on the floor; more change its depth by less than the error of a run
 N_FLOOR_POINTS = 100
-MIN_WORN_DEPTH_FRACTION = 1e-3  # smallest depth of a worn node relative to the largest depth
-MIN_HEIGHT_RANGE = 1e-12  # range of heights [m] below which an unworn surface is flat
 
 
 class PatchState(NamedTuple):
@@ -103,7 +99,8 @@ def measure_wear(first: PatchState, second: PatchState) -> Wear:
     error = depth_error or 0.0
 
     # a node is worn if its depth is larger than the error
-    is_worn = depth > max(error, MIN_WORN_DEPTH_FRACTION * float(depth.max()), 0.0)
+    # Smallest depth of a worn node relative to the largest depth
+    is_worn = depth > max(error, 1e-3 * float(depth.max()), 0.0)
     hidden = find_plane_below(x, second.y, depth)
     worn_fraction = float(second.area[is_worn].sum()) / area
     mean_error = None if volume_error is None else volume_error / area
@@ -135,7 +132,8 @@ def _require_same_patch(first: PatchState, second: PatchState) -> None:
     # tables may name files that changed, so the unworn gaps are compared too
     unworn = [_move_to(second, state, state.gap - state.depth) for state in (first, second)]
     difference = max_abs(unworn[0] - unworn[1])
-    if difference > GAP_DIFFERENCE_FRACTION * float(np.ptp(unworn[1])) + MIN_HEIGHT_RANGE:
+    # Range of heights [m] below which an unworn surface is flat
+    if difference > GAP_DIFFERENCE_FRACTION * float(np.ptp(unworn[1])) + 1e-12:
         raise PatchfemError(
             f"{both}: their unworn surfaces differ by {format_length(difference, 3)}"
         )
@@ -261,7 +259,8 @@ def _measure_track(x, depth, is_worn, error: float, area: float) -> dict[str, Qu
 
     # an end is known to the half of both neighbouring elements
     cells = [float(x[min(k + 1, x.size - 1)] - x[max(k - 1, 0)]) / 2 for k in (first, last)]
-    places = np.linspace(start, end, WORN_WIDTH_OVER_FLOOR_WIDTH * N_FLOOR_POINTS)
+    # Width of the worn part divided by that of its floor, the deepest fifth
+    places = np.linspace(start, end, 5 * N_FLOOR_POINTS)
     means = np.convolve(
         np.interp(places, x, depth), np.full(N_FLOOR_POINTS, 1 / N_FLOOR_POINTS), "valid"
     )

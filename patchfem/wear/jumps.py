@@ -9,11 +9,8 @@ from ..core import array_dataclass, max_abs
 from .depth import Press, solve_jump, wear_rates
 
 MAX_JUMP_GROWTH = 4.0  # largest ratio of the length of a jump to that of the previous jump
-# Smallest ratio of the length of a repeated jump to that of the rejected jump
-MIN_REPEATED_JUMP_RATIO = 0.2
 JUMP_SAFETY_FACTOR = 0.9  # safety factor on the length of a jump that would just meet the tolerance
 FIRST_JUMP_FRACTION = 1e-3  # length of the first automatic jump as a fraction of all cycles
-MIN_JUMP_FRACTION = 1e-9  # smallest length of a jump as a fraction of all cycles
 JUMP_ORDER = 2  # order of the method of `depth.solve_jump`
 # Ratio of the difference between a jump and its two halves to the error of the halves
 RICHARDSON_DIVISOR = 2**JUMP_ORDER - 1
@@ -21,9 +18,6 @@ RICHARDSON_DIVISOR = 2**JUMP_ORDER - 1
 MIN_ERROR_RATIO = 1e-9
 # Smallest depth [m] in a divisor; it keeps quotients finite before anything is worn
 MIN_WORN_DEPTH = 1e-300
-# Smallest wear of a jump, relative to the worn depth, with which the error of its slip path is
-# compared; a jump with less wear hardly changes the depth
-SHAKEDOWN_WEAR_RATIO = 1e-3
 
 
 @array_dataclass
@@ -149,14 +143,14 @@ def take_jump(
     while True:
         path = np.maximum(state.path + 0.5 * length * state.trend, 0.0)
         after, error = _take_halves(problem, state, path, length, tolerance)
-        is_forced = count or length <= MIN_JUMP_FRACTION * problem.cycles
+        # Smallest length of a jump as a fraction of all cycles
+        is_forced = count or length <= 1e-9 * problem.cycles
         if is_forced or error <= 1:
             after, error = _correct_path(problem, state, after, error, length, tolerance)
             if is_forced or error <= 1:
                 break
-        length *= max(
-            MIN_REPEATED_JUMP_RATIO, JUMP_SAFETY_FACTOR * error ** (-1 / (JUMP_ORDER + 1))
-        )
+        # Smallest ratio of the length of a repeated jump to that of the rejected jump
+        length *= max(0.2, JUMP_SAFETY_FACTOR * error ** (-1 / (JUMP_ORDER + 1)))
 
     # The error of a method of order p falls with the power p + 1 of the length
     growth = min(
@@ -205,7 +199,9 @@ def _correct_path(
     # error of the mean is 1/(3 + 3 k/h) of the difference of both, which is at most a third.
     path_error = max_abs(repeated.depth - after.depth) / 3
     worn = float((repeated.depth - state.depth).max())
-    scale = max(worn, SHAKEDOWN_WEAR_RATIO * float(repeated.depth.max()))
+    # Smallest wear of a jump, relative to the worn depth, with which the error of its slip path is
+    # compared; a jump with less wear hardly changes the depth
+    scale = max(worn, 1e-3 * float(repeated.depth.max()))
     corrected = replace(
         repeated,
         path=path,

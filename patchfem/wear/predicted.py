@@ -24,18 +24,11 @@ N_TRIAL_COEFFICIENTS = 90  # number of trial coefficients in the search
 MAX_REFINED_POSITIONS = 24
 # Smallest fraction of the patch on the traces for which its position is known
 MIN_PATCH_OVERLAP = 0.25
-# Part of half the patch beyond its ends, whose unworn depths show where the wear ends
-END_MARGIN_OVER_HALF_PATCH = 0.1
-# Largest wear coefficient, relative to that of the computed run, for which the run has the shape of the worn profile
-MAX_COEFFICIENT_RATIO = 2.0
 # Largest relative coefficient of the search, so that a message can propose one
 MAX_SEARCHED_COEFFICIENT_RATIO = 1e4
 MAX_WIDTH_RATIO = 1.5  # largest ratio of the widths of measured and computed wear
 # Depth at the ends of the computed wear relative to its largest depth
 WORN_END_DEPTH_FRACTION = 0.05
-# Increase of the sum of squares, in variances, of an equally good position
-MAX_ACCEPTED_DEVIANCE = 4.0
-MIN_DEGREES_OF_FREEDOM = 3.0  # smallest number of degrees of freedom of Student's t
 # Ratio of two lengths or depths from which on the units are likely to be wrong
 WRONG_UNIT_RATIO = 20.0
 
@@ -229,7 +222,8 @@ def fit_wear(measured: MeasuredDepth, history: WearHistory) -> PredictedWear:
     start, others = _search(bins, history)
 
     # depths far from the patch tell nothing about its wear
-    near = np.abs(bins.middles - start.centre) <= (1 + END_MARGIN_OVER_HALF_PATCH) * history.half
+    # Part of half the patch beyond its ends, whose unworn depths show where the wear ends
+    near = np.abs(bins.middles - start.centre) <= (1 + 0.1) * history.half
     first, last = np.flatnonzero(near)[[0, -1]]
     bins = bins._replace(
         edges=bins.edges[first : last + 2],
@@ -283,7 +277,9 @@ def _require_similar(width: float | None, bins: Bins, history: WearHistory, best
     `width` is that of the measured track, or None without one, and `bins` have the measured depth. `history` is the
     computed depth over the cycles, and `best` its fitted place.
     """
-    if not history.work[1] <= best.ratio <= MAX_COEFFICIENT_RATIO:
+    # Largest wear coefficient, relative to that of the computed run, for which the run has the
+    # shape of the worn profile
+    if not history.work[1] <= best.ratio <= 2.0:
         raise PatchfemError(
             f"compare --predicted: the measured wear needs {best.ratio:.3g} times the wear coefficient of {history.source}, "
             "for which the run computed no depth; run the scene again with wear.coefficient = "
@@ -404,7 +400,8 @@ def _make_result(
     half_centre = np.hypot(HALF_WIDTH_95 * spread[1], other.centre - best.centre)
 
     # places whose sum of squares is larger by less than some variances of an independent block
-    limit = best.squares * (1 + MAX_ACCEPTED_DEVIANCE / n_blocks)
+    # Increase of the sum of squares, in variances, of an equally good position
+    limit = best.squares * (1 + 4.0 / n_blocks)
     accepted = [best, *(place for place in others if place.squares <= limit)]
     ratios = [place.ratio for place in accepted]
     centres = [place.centre for place in accepted]
@@ -469,7 +466,8 @@ def _measure_spread(
     correlation = correlation / correlation[0] if correlation[0] > 0 else np.zeros(count)
     positive = int(np.argmax(correlation <= 0)) if (correlation <= 0).any() else count
     length = 1 + 2 * float(correlation[1:positive].sum())
-    n_blocks = max(count / length, MIN_DEGREES_OF_FREEDOM + 2)
+    # Smallest number of degrees of freedom of Student's t
+    n_blocks = max(count / length, 3.0 + 2)
     freedom = n_blocks - 2
 
     gain = np.linalg.pinv(jacobian)

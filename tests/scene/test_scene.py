@@ -8,7 +8,7 @@ import pytest
 from scene_texts import BENCH, FULL, LINEAR, PATCH, RIG
 
 from patchfem.scene import load, loads
-from patchfem.scene.lines import find_key_lines
+from patchfem.scene.keys.lines import find_key_lines
 from patchfem.scene.scene import SceneError
 
 

@@ -135,7 +135,7 @@ def draw_faults(seed: int, count: int, folders: list[str]) -> list[Fault]:
     for path in sorted((ROOT / "patchfem").rglob("*.py")):
         parts = path.relative_to(ROOT).parts
         is_chosen = not folders or parts[1] in folders
-        if is_chosen and not path.name.endswith("_kernels.py") and "compiled" not in parts:
+        if is_chosen and not path.name.endswith("_kernels.py") and "kernel_cache" not in parts:
             found += list_faults(path)
     generator = random.Random(seed)
     drawn = []

@@ -34,18 +34,9 @@ CURVE_UNITS = {
 # Header of the table of a measured curve, for messages
 CURVE_HEADER = "amplitude [um],frequency [Hz],damping [%]"
 FITTED_NAMES = ("frequency", "damping")  # rows of the values of a measured curve
-# First error, relative to the value, of a quantity without a column of errors; the scatter replaces it.
-FIRST_ASSUMED_RELATIVE_ERROR = 5e-2
-MAX_REWEIGHTINGS = 8  # largest number of fits by a method in which the scatter replaces the errors
-# Relative change of an assumed error from one fit to the next below which it is known; it hardly changes the weights
-SAME_ERROR_TOL = 0.01
-# Smallest relative standard deviation of a value, which keeps its weight finite.
-MIN_RELATIVE_DEVIATION = 1e-6
 # Largest relative difference of a measured amplitude and that of its computed point.
 SAME_AMPLITUDE_TOL = 1e-6
 N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
-# Change of a parameter in half-widths of its interval, for the slope of the fitted curve.
-SLOPE_STEP_IN_HALF_WIDTHS = 0.1
 # Ratio by which the fitted curve goes beyond the measured amplitudes on both sides
 CURVE_EXTENSION_RATIO = 3.0
 
@@ -98,7 +89,9 @@ class CurveComparison(Comparison):
         order = np.argsort(amplitude, kind="stable")
         self.amplitude = amplitude[order]
         value = np.array([columns[name][order] for name in FITTED_NAMES])
-        error = FIRST_ASSUMED_RELATIVE_ERROR * np.abs(value)
+        # First error, relative to the value, of a quantity without a column of errors; the scatter
+        # replaces it.
+        error = 5e-2 * np.abs(value)
         self.is_assumed = np.array([f"{name}_error" not in columns for name in FITTED_NAMES])
         for row in np.flatnonzero(~self.is_assumed):
             error[row] = columns[f"{FITTED_NAMES[row]}_error"][order]
@@ -128,7 +121,8 @@ class CurveComparison(Comparison):
     @property
     def _min_deviation(self) -> np.ndarray:
         """Smallest standard deviation (2k,) of the measured values."""
-        return MIN_RELATIVE_DEVIATION * np.abs(self.measured)
+        # Smallest relative standard deviation of a value, which keeps its weight finite.
+        return 1e-6 * np.abs(self.measured)
 
     def compute(self, values: Sequence[float], needed: np.ndarray | None = None) -> np.ndarray:
         """Compute frequencies [Hz] and damping ratios (2k,) for values (n,) of the keys.
@@ -147,9 +141,12 @@ class CurveComparison(Comparison):
     def refine(self, values: np.ndarray, training: np.ndarray) -> bool:
         """Replace assumed errors by the scatter around the fit, then the fast method by the reference method."""
         self.n_reweightings += 1
-        if self.is_assumed.any() and self.n_reweightings <= MAX_REWEIGHTINGS:
+        # Largest number of fits by a method in which the scatter replaces the errors
+        if self.is_assumed.any() and self.n_reweightings <= 8:
             deviation = self.estimate_deviation(self.compute(values), training)
-            if np.abs(np.log(deviation / self.deviation)).max() >= SAME_ERROR_TOL:
+            # Relative change of an assumed error from one fit to the next below which it is known;
+            # it hardly changes the weights
+            if np.abs(np.log(deviation / self.deviation)).max() >= 0.01:
                 self.deviation = deviation
                 return True
         self.n_reweightings = 0
@@ -271,9 +268,9 @@ class CurveComparison(Comparison):
         try:
             curve = compute(fit.values)
             # changes of the curve per half-width of each parameter; a step towards the middle stays within its range
-            steps = np.copysign(
-                SLOPE_STEP_IN_HALF_WIDTHS, self.keys.bounds.mean(axis=1) - fit.values
-            )
+            # Change of a parameter in half-widths of its interval, for the slope of the fitted
+            # curve.
+            steps = np.copysign(0.1, self.keys.bounds.mean(axis=1) - fit.values)
             for k in range(half_widths.size if is_determined else 0):
                 shifted = fit.values + steps * half_widths * (np.arange(half_widths.size) == k)
                 slopes[k] = (compute(shifted) - curve) / steps[k]

@@ -32,14 +32,8 @@ MAX_STEPS_PER_ROW = 64
 MAX_STEP_CHANGE_OVER_TOLERANCE = 0.1
 # Ratio of the rest speed of growing bonds to the largest measured speed.
 REST_SPEED_FRACTION = 1e-3
-# Smallest fraction of independent rows for which no warning about correlation is issued.
-MIN_INDEPENDENT_FRACTION = 0.6
-# Ratio of the residual to the peak force up to which round-off dominates the residual.
-MIN_RMS_OVER_PEAK = 1e-6
 # Ratio of the largest displacement of a record to that of the scene beyond which one of their units is doubtful
 MAX_STROKE_RATIO = 100
-# Largest ratio of the force in the first row to the peak force for a record that begins at rest.
-MAX_FIRST_FORCE_OVER_PEAK_FORCE = 0.2
 
 
 class LoopComparison(Comparison):
@@ -217,8 +211,10 @@ class LoopComparison(Comparison):
         warnings = []
 
         # Correlated deviations are an error of the model. Deviations of the size of round-off say nothing.
-        is_exact_fit = fitted.fit.rms <= MIN_RMS_OVER_PEAK * peak
-        if not is_exact_fit and n_independent < MIN_INDEPENDENT_FRACTION * n_used:
+        # Ratio of the residual to the peak force up to which round-off dominates the residual.
+        is_exact_fit = fitted.fit.rms <= 1e-6 * peak
+        # Smallest fraction of independent rows for which no warning about correlation is issued.
+        if not is_exact_fit and n_independent < 0.6 * n_used:
             warnings.append(
                 "the deviations of neighbouring rows are correlated, so the intervals are computed as "
                 f"if the {n_used} rows were {max(n_independent, 1):.3g} independent rows; a part of the deviation "
@@ -230,7 +226,9 @@ class LoopComparison(Comparison):
         first_force = abs(self.measured[0])
         scene = self.keys.scene
         needs_no_start = fitted.held_out[0] or law_has_trait(scene.friction.law, "memoryless")
-        if first_force > MAX_FIRST_FORCE_OVER_PEAK_FORCE * peak and not needs_no_start:
+        # Largest ratio of the force in the first row to the peak force for a record that begins at
+        # rest.
+        if first_force > 0.2 * peak and not needs_no_start:
             warnings.append(
                 f"the force in the first row is {first_force / peak:.0%} of the largest force, but the model "
                 "starts without force: repeat the rows of the first cycle before the record, with a column of labels, and "

@@ -23,9 +23,6 @@ from ..free_keys import FreeKeys
 from ..held_out import group_by_column, select_held_out
 from .options import FitOptions
 
-# Largest number of refinements of a model in a fit; two to five suffice.
-MAX_REFINEMENTS = 20
-
 
 @dataclass(frozen=True, slots=True)
 class Listener:
@@ -271,7 +268,8 @@ def _search_minimum(
         With intervals that contain the errors of the data.
     """
     fit = None
-    for _ in range(MAX_REFINEMENTS):
+    # Largest number of refinements of a model in a fit; two to five suffice.
+    for _ in range(20):
         problem = _make_problem(comparison, training, fit)
         try:
             fit = problem.search(n_starts if fit is None else 1, report)

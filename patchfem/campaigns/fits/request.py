@@ -7,7 +7,7 @@ from ...core import PatchfemError
 from ...inputs.measured import RESPONSE_COLUMN_UNITS, RESPONSE_TABLE_FORMAT
 from ...inputs.tables import read_text
 from ...scene.assignments import Range
-from ...scene.files import UNIVERSAL_EXTENSIONS
+from ...scene.keys.tables import UNIVERSAL_EXTENSIONS
 from ...scene.scene import Scene
 from .curve import CURVE_HEADER, CURVE_UNITS, CurveComparison
 from .loop import LoopComparison

@@ -32,10 +32,6 @@ MAX_WORN_DEPTH_NAME = "worn_depth_max"
 WORN_DEPTH_NAMES = ("worn_depth_mean", MAX_WORN_DEPTH_NAME)
 # Names in compare.json of the part that two measured surfaces of a piece have in common
 COMMON_PART_NAMES = {"common_length", "common_area"}
-# Largest relative difference of computed and measured depth, over the tolerance, at which the search ends.
-MAX_DEPTH_ERROR_OVER_TOLERANCE = 0.1
-# Standard deviation of a depth that is given without an interval, relative to the depth; it keeps its weight finite
-MIN_DEPTH_DEVIATION_RATIO = 1e-9
 # Half-width of a 95 % interval in standard deviations
 HALF_WIDTH = stdtrit(np.inf, 0.975)
 # Scene key of the wear coefficient [m2/N], the only one that is fitted to a wear depth
@@ -204,16 +200,18 @@ class DepthComparison(Comparison):
     def compare(self, computed: np.ndarray) -> np.ndarray:
         """Return the distance (1,) from the measured depth, in standard deviations of the interval on this side."""
         end = np.where(computed < self.measured, self.depth.low, self.depth.high)
-        half_width = np.maximum(
-            np.abs(end - self.measured), MIN_DEPTH_DEVIATION_RATIO * self.measured
-        )
+        # Standard deviation of a depth that is given without an interval, relative to the depth; it
+        # keeps its weight finite
+        half_width = np.maximum(np.abs(end - self.measured), 1e-9 * self.measured)
         return HALF_WIDTH * (computed - self.measured) / half_width
 
     def refine(self, values: np.ndarray, training: np.ndarray) -> bool:
         """Correct the curve by a run with the fitted coefficient, and return whether the depth has changed."""
         depth = self._compute_curve(values[0])[1, -1]
         correction = float(depth / self.compute(values, training)[0])
-        tolerance = MAX_DEPTH_ERROR_OVER_TOLERANCE * self.keys.scene.accuracy.tolerance
+        # Largest relative difference of computed and measured depth, over the tolerance, at which
+        # the search ends.
+        tolerance = 0.1 * self.keys.scene.accuracy.tolerance
         if abs(correction - 1) <= tolerance:
             return False
         self.factor *= correction

@@ -21,11 +21,9 @@ from ...disk.file_hashes import hash_named_files, iterate_texts
 from ...model.model import Model, build
 from ...model.structure import JOINT_WORDS, name_joint_source
 from ...scene.files import require_files
-from ...scene.lines import split_assignment
+from ...scene.keys.lines import split_assignment
 from ...scene.overrides import BaseScene, PlainNumbers
 from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
-
-MAX_CACHED_MODELS = 64  # models of a sweep from which those of similar cases are derived
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +115,8 @@ class SweepScene:
             similar = SimilarBase(numbers, build(scene))
         except PatchfemError:  # each case reports its own error
             return None
-        if len(models) >= MAX_CACHED_MODELS:
+        # Models of a sweep from which those of similar cases are derived
+        if len(models) >= 64:
             models.clear()
         models[keys, shared] = similar
         return similar

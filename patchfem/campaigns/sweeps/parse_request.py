@@ -17,8 +17,8 @@ from ...scene.assignments import (
     read_assignments,
     require_possible_count,
 )
+from ...scene.keys.lines import split_assignment, split_key
 from ...scene.keys.quantities import NUMBER_PATTERN
-from ...scene.lines import split_assignment, split_key
 from ...scene.scene import SceneError
 from ...scene.toml_text import read_text
 from . import samples, table

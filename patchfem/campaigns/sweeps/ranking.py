@@ -29,20 +29,13 @@ RANKED_MEASURES = (
     "tangential_stiffness",
     "stick_fraction",
 )
-MAX_RESPONSE_SURFACE_CASES = 640  # largest number of cases of a surface, whose equations are dense
 N_SOBOL_POINTS = 1024  # sample points on a surface, for an error of about SOBOL_INDEX_ERROR
 SOBOL_INDEX_ERROR = 0.005  # sampling error of an index
 # Smoothing parameters of a surface, from interpolation to nearly a plane.
 SMOOTHING_PARAMETERS = (1e-8, 1e-4, 1e-2, 1.0)
-# Parts of the cases, each of which checks a surface through the others
-N_CROSS_VALIDATION_FOLDS = 3
-MIN_CASES_PER_KEY = 16  # with fewer, half of the cases do not show the error of an index
-# Fraction of the variance of the other half that a usable surface explains
-MIN_EXPLAINED_VARIANCE_FRACTION = 0.5
 # Smallest fraction of cases with a value. The others may be no random sample.
 MIN_FRACTION_OF_KNOWN_CASES = 0.9
 QUANTILE_PROBABILITIES = (0.05, 0.5, 0.95)
-MIN_RANDOM_CASES = 20  # smallest number of cases for a statement about 90 % of them
 SPREAD_ROUND_OFF = 1e-9  # relative spread of values that differ by round-off only
 
 
@@ -84,7 +77,8 @@ def rank_keys(table: SweepTable) -> dict[str, list[SobolIndex]]:
         index_arrays = [compute_grid_indices(grid)[:, varied] for grid in grids]
     else:
         known = np.isfinite(list(columns.values())).all(axis=0) if columns else np.zeros(1, bool)
-        if known.sum() < MIN_CASES_PER_KEY * len(varied):
+        # With fewer, half of the cases do not show the error of an index
+        if known.sum() < 16 * len(varied):
             return {}
         from scipy.stats import rankdata
 
@@ -151,8 +145,10 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
 
     # The cases are divided into folds: each is predicted by a response surface through the others
     rng = np.random.default_rng(0)
-    every = rng.permutation(len(coordinates))[:MAX_RESPONSE_SURFACE_CASES]
-    parts = np.array_split(every, N_CROSS_VALIDATION_FOLDS)
+    # Largest number of cases of a surface, whose equations are dense
+    every = rng.permutation(len(coordinates))[:640]
+    # Parts of the cases, each of which checks a surface through the others
+    parts = np.array_split(every, 3)
     folds = [(np.setdiff1d(every, part), part) for part in parts]
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
 
@@ -189,7 +185,8 @@ def estimate_random_indices(coordinates: np.ndarray, values: np.ndarray) -> list
     margin = unexplained[:, None] + SOBOL_INDEX_ERROR
     limits = [total.min(axis=0) - margin, total.max(axis=0) + margin]
     arrays = np.clip([first[0], total[0], *limits], 0.0, 1.0).transpose(1, 0, 2)
-    is_usable = unexplained < 1 - MIN_EXPLAINED_VARIANCE_FRACTION
+    # Fraction of the variance of the other half that a usable surface explains
+    is_usable = unexplained < 1 - 0.5
     return [array if usable else None for array, usable in zip(arrays, is_usable)]
 
 
@@ -219,7 +216,8 @@ def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
     """
     quantiles = {}
     settled = table.has_settled
-    if not table.is_random or len(table) < MIN_RANDOM_CASES:
+    # Smallest number of cases for a statement about 90 % of them
+    if not table.is_random or len(table) < 20:
         return {}
     for name in RANKED_MEASURES:
         if _varies(table, name):

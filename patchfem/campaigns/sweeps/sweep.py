@@ -24,8 +24,6 @@ from .cases import Cases
 # Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
 # with a sweep.
 TARGET_CHUNK_SECONDS = 1.0
-MAX_CASES_PER_CHUNK = 4096  # Largest number of cases in a chunk.
-MIN_SIMILAR_CASES = 2  # Smallest number of cases whose models are derived from one of them.
 MAX_CASES_TRIED = 3  # Cases that are tried until one is valid, which shows the plain keys.
 
 
@@ -126,7 +124,8 @@ def _group_models(
     keys = work.plain_keys
     columns = dict(zip([axis.key for axis in cases.axes], cases.make_columns(numbers)))
     for places in cases.split_into_groups(numbers, keys) if keys else ():
-        if len(places) < MIN_SIMILAR_CASES:
+        # Smallest number of cases whose models are derived from one of them.
+        if len(places) < 2:
             continue
 
         # the case in the middle is the base, or else one at an end, if its scene is valid
@@ -243,7 +242,8 @@ class ChunkQueue:
             # at about the same time.
             max_size = -(-n_remaining // (2 * self.workers))
         size = max(int(TARGET_CHUNK_SECONDS / max(self.seconds_per_case, 1e-9)), self.min_size)
-        size = max(1, min(size, MAX_CASES_PER_CHUNK, max_size))
+        # Largest number of cases in a chunk.
+        size = max(1, min(size, 4096, max_size))
         return [self.remaining.popleft() for _ in range(size)]
 
     def record_death(self, numbers: Sequence[int]) -> list[int]:

@@ -9,13 +9,11 @@ from ..answer import Answers, Variable, Variables
 from ..rows import Chart
 from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
 
-MAX_MAP_COLUMNS = 400  # largest number of columns; a finer map keeps every n-th one
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
 BOLD_CURVE_WEIGHT = 1.8  # width of a recommended curve over the usual one
 THIN_CURVE_WEIGHT = 0.6  # width of the other curves of its chart over the usual one
 SWEEP_CHART_STYLES = ("relative", "menu", "maps")
 N_MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
-MAX_CHARTED_INTERFACES = 6  # largest number of interfaces with charts of their own
 
 
 def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
@@ -43,7 +41,8 @@ def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
 
 def _repeat_for_interfaces(chart: Chart, data: Variables) -> list[Chart]:
     """Return a chart over x for each interface that has a patch of its own, with the variables x_1, x_2, ..."""
-    numbers = [number for number in range(1, MAX_CHARTED_INTERFACES + 1) if f"x_{number}" in data]
+    # Largest number of interfaces with charts of their own
+    numbers = [number for number in range(1, 6 + 1) if f"x_{number}" in data]
     if chart.x != "x" or "x" in data or not numbers:
         return [chart]
     charts = []
@@ -322,7 +321,8 @@ def _make_map(data: Variables, chart: Chart, x_axis: Axis, colours: Axis) -> Pan
     if not np.isfinite(values).any():
         return None
     x = _as_floats(data[_find_x(data, chart)]) * x_axis.scale
-    step = -(-x.size // MAX_MAP_COLUMNS)
+    # Largest number of columns; a finer map keeps every n-th one
+    step = -(-x.size // 400)
 
     # the rows are a coordinate y in the units of x, the time, or frames
     y_axis = Axis("frame")

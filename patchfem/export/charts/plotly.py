@@ -19,10 +19,8 @@ STATE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")
 OVERLAID_CURVE_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))
 ERROR_BAND_OPACITY = 0.18  # opacity of an error band, 1 for the colour of its curve
 FILM_FRAME_MILLISECONDS = 120
-AREA_MARGIN_FRACTION = 0.02  # room beside a filled curve, relative to its length; less is not seen
-MAX_DECADES_WITH_DIGITS = (
-    3  # of a logarithmic axis with labels at 1, 2 and 5; more decades have room for powers of 10
-)
+# largest number of decades of a logarithmic axis with labels at 1, 2 and 5; more have room for powers of 10 only
+MAX_DECADES_WITH_DIGITS = 3
 # figure of plotly.js, or a part of it, as an object of its JSON
 Figure = dict[str, Any]
 # Position of a menu, above its chart.
@@ -55,7 +53,8 @@ def _make_layout(panel: Panel) -> Figure:
     if panel.style == "area":
         # the peaks at the ends of a contact do not lie on the frame
         x = panel.curves[0].x
-        room = AREA_MARGIN_FRACTION * np.ptp(x)
+        # Room beside a filled curve, relative to its length; less is not seen
+        room = 0.02 * np.ptp(x)
         layout["xaxis"]["range"] = [x.min() - room, x.max() + room]
     if panel.marks:
         layout["shapes"] = list(map(_make_vertical_line, panel.marks))

@@ -18,7 +18,6 @@ from ..rows import Chart
 from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
-MAX_CHART_LINES = 8  # lines of a chart, one for each combination of the other keys
 MAX_MAP_VALUES_PER_KEY = 40  # values of each key in a map
 # Ratio of the largest to the smallest value of a key and of a measure at which an axis is logarithmic.
 MIN_LOG_AXIS_KEY_RATIO = 10.0
@@ -203,7 +202,8 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
         arrays = (values, np.maximum(values - errors, least), values + errors, symbols)
 
         labels = view.name_lines()
-        lines = spread_indices(len(values), MAX_CHART_LINES)
+        # Lines of a chart, one for each combination of the other keys
+        lines = spread_indices(len(values), 8)
         for line in lines:
             keep = select_curve_points(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
             y, low, high, marks = (array[line][keep] for array in arrays)

@@ -21,8 +21,6 @@ from ...runs.pieces import (
 )
 from ..rows import VARIABLES
 
-# parts of a run in the order in which they are stored
-STORED_PARTS = ("lower", "upper", "interface")
 VTK_CELL_TYPES = np.array([0, 1, 3, 5, 9], np.uint8)  # cell type of VTK by number of nodes
 VTKHDF_FILE = "fields.vtkhdf"  # name of the file in a results folder
 # Version of the format VTKHDF
@@ -336,7 +334,8 @@ def read_frames(path: Path, names: set[str] | None = None) -> Frames:
             root = file["VTKHDF"]
             times = root["Steps/Values"][:]
             is_face = not REQUIRED_FACE_FIELDS - {*root["interface/CellData"]}
-            parts = ("interface",) if is_face else STORED_PARTS
+            # Parts of a run in the order in which they are stored
+            parts = ("interface",) if is_face else ("lower", "upper", "interface")
             for part in parts:
                 required = REQUIRED_FACE_FIELDS if is_face else REQUIRED_FIELDS[part]
                 missing = required - {*root[part]["PointData"], *root[part]["CellData"]}

@@ -6,6 +6,6 @@ laboratory files as tables and modes, `structures` writes matrices and friction 
 Read `write` first.
 """
 
-from ...scene.files import UNIVERSAL_EXTENSIONS
+from ...scene.keys.tables import UNIVERSAL_EXTENSIONS
 
 LAB_FILE_ENDINGS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv")

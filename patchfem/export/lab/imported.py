@@ -13,9 +13,9 @@ from ...identify import measured_modes
 from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
 from ...inputs.units import SI_UNITS
-from ...scene.files import UNIVERSAL_EXTENSIONS
 from ...scene.keys import quantities
 from ...scene.keys.removed import describe_removed
+from ...scene.keys.tables import UNIVERSAL_EXTENSIONS
 from ..answer import JsonObject
 from ..columns import format_csv
 from . import write

@@ -32,7 +32,6 @@ SI_UNITS_DATASET = {
 }
 # histories that form a friction loop with the slide of the same interface
 LOOP_FORCE_NAMES = ("friction_force", "force", "friction_ratio", "fitted")
-MAX_TIME_STEP_RATIO = 5.0  # largest ratio of a time step to the last one if all samples are stored
 
 
 class Column(NamedTuple):
@@ -248,7 +247,8 @@ def _note_thinning(answer: Answer) -> str:
         return ""
     time = answer.data["time"].values
     steps = np.diff(time)
-    (uneven,) = np.nonzero(steps > MAX_TIME_STEP_RATIO * steps[-1])
+    # Largest ratio of a time step to the last one if all samples are stored
+    (uneven,) = np.nonzero(steps > 5.0 * steps[-1])
     if not uneven.size:
         return ""
     return (

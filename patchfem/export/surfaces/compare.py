@@ -27,9 +27,6 @@ from ..runs import make_quantities
 from . import shared, worn
 from .shared import SURFACE_NAMES, build_answer, convert_quantities, make_band, make_maps
 
-CHARTED_QUANTITIES = ("worn_depth_mean", "amplitude_ratio")  # quantities of the charts of pairs
-N_ABBOTT_POINTS = 201  # points of each Abbott curve, which is smooth
-
 
 def answer_files(
     before: Path,
@@ -214,7 +211,8 @@ def _make_abbott(heights) -> Variables:
     known = [values[np.isfinite(values)] for values in heights]
     if not all(values.size for values in known):
         return {}
-    before, after = (abbott_curve(values, N_ABBOTT_POINTS) for values in known)
+    # Points of each Abbott curve, which is smooth
+    before, after = (abbott_curve(values, 201) for values in known)
     return make_variables(
         "surface", material_ratio=before[0], abbott_before=before[1], abbott_after=after[1]
     )
@@ -336,7 +334,8 @@ def _count_pairs(rows: list[JsonObject]) -> str:
 def _make_pairs_data(rows: list[JsonObject]) -> Variables:
     """Return the quantities of the charts with their intervals over the line of each pair."""
     columns = {"line": [float(row["line"]) for row in rows]}
-    for name in CHARTED_QUANTITIES:
+    # Quantities of the charts of pairs
+    for name in ("worn_depth_mean", "amplitude_ratio"):
         for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
             columns[name + suffix] = [row.get(name, {}).get(key) for row in rows]
     return make_variables("surface", **columns)

@@ -23,10 +23,6 @@ from .shared import make_maps
 ROUGHNESS_INPUT_WORDS = {"profile": "traces", "areal": "scans"}
 # Probability of the interval of a parameter of a single trace, from 5 to 95 %
 TRACE_INTERVAL_PROBABILITY = 0.9
-# Ratio of lengths or steps of several files, above which their means mix quantities.
-MAX_LENGTH_OR_STEP_RATIO = 1.001
-# Largest ratio of the end of an interval of a mean to the mean that says something.
-MAX_INTERVAL_END_TO_MEAN = 2.0
 # parameters in the headline: those of a scan, of a trace with a cut-off, and of one without
 HEADLINE_PARAMETERS = (("Sa", "Sq", "Sz"), ("Ra", "Rq", "Rz"), ("Pa", "Pq", "Pt"))
 INTERVAL_NOTE = (
@@ -143,7 +139,8 @@ def _average_parameters(members: list[RoughnessReport]) -> dict[str, Mean]:
         if not name.endswith("sk") and mean > 0:
             factor = np.exp(error / mean)
             ends = (mean / factor, mean * factor)
-            if factor > MAX_INTERVAL_END_TO_MEAN:
+            # Largest ratio of the end of an interval of a mean to the mean that says something.
+            if factor > 2.0:
                 ends = (None, None)
                 reason = "few_files"
         averaged = quantity._replace(value=mean, low=ends[0], high=ends[1], reason=reason)
@@ -156,7 +153,8 @@ def _find_caution(members: list[RoughnessReport]) -> list[str]:
     if len({report.source for report in members}) < len(members):
         return [TWICE_NOTE]
     sizes = np.array([(report.sampling.length, report.sampling.step) for report in members])
-    is_mixed = (sizes.max(axis=0) > MAX_LENGTH_OR_STEP_RATIO * sizes.min(axis=0)).any()
+    # Ratio of lengths or steps of several files, above which their means mix quantities.
+    is_mixed = (sizes.max(axis=0) > 1.001 * sizes.min(axis=0)).any()
     return [SIZES_NOTE] if is_mixed else []
 
 

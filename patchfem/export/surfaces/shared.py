@@ -19,7 +19,6 @@ from ..answer import JsonObject, Remarks, Variables
 from ..rows import make_variables
 from ..surface_definitions import name_in_track
 
-MAX_MAP_POINTS = 400  # largest number of rows and of columns of a stored map
 SURFACE_NAMES = ("before", "after")  # keys of the two compared surfaces or runs
 # Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
 SHOWN_ELSEWHERE = (
@@ -63,7 +62,8 @@ def make_band(name: str, values: np.ndarray, half_width: np.ndarray) -> Variable
 
 def make_maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> Variables:
     """Return maps (m, n) [m] at x (n,), y (m,) [m] as variables, with every k-th row and column if they are large."""
-    rows, columns = (slice(None, None, -(-axis.size // MAX_MAP_POINTS)) for axis in (y, x))
+    # Largest number of rows and of columns of a stored map
+    rows, columns = (slice(None, None, -(-axis.size // 400)) for axis in (y, x))
     maps = {name: one[rows, columns].astype(np.float32) for name, one in heights.items()}
     return make_variables("surface", x=x[columns], y=y[rows], **maps)
 

@@ -23,15 +23,10 @@ from . import shared
 from .shared import SURFACE_NAMES, build_answer, format_value, make_band, make_maps
 
 REQUIRED_VARIABLES = ("x", "weight", "unloaded_gap", "normal_stress")
-# Smallest relative difference of the proportional coefficient that is reported.
-MIN_COEFFICIENT_DIFFERENCE = 0.01
-# Number of independent blocks of a difference of depths below which it is a smooth pattern, not scatter
-MIN_SCATTER_BLOCKS = 10.0
 # Smallest rms of a smooth difference, relative to the mean depth and to its noise, that shows another shape
 MIN_SHAPE_MISFIT_FRACTION = 0.1
 MIN_SHAPE_MISFIT_DEVIATIONS = 2.0
 PROPOSAL_FACTOR = 1.2  # ratio of the wear coefficient that a note proposes to the fitted one
-N_VERDICT_MEASURES = 3  # first ones of COMPARED_MEASURES, which the verdict states
 # Hidden wear relative to the mean depth from which on the verdict states it.
 MIN_HIDDEN_WEAR_RATIO = 0.01
 BOTH_PIECES_NOTE = (
@@ -276,7 +271,9 @@ def warn_of_other_shape(fitted: PredictedWear) -> list[str]:
     limit = max(
         MIN_SHAPE_MISFIT_FRACTION * fitted.mean_computed, MIN_SHAPE_MISFIT_DEVIATIONS * deviation
     )
-    if fitted.n_blocks >= MIN_SCATTER_BLOCKS or fitted.difference_rms <= limit:
+    # Number of independent blocks of a difference of depths below which it is a smooth pattern, not
+    # scatter
+    if fitted.n_blocks >= 10.0 or fitted.difference_rms <= limit:
         return []
     return [
         f"The computed shape does not fit: the two depths differ in a smooth pattern by {_format_percent(fitted)} of the "
@@ -296,7 +293,8 @@ def describe_reliability(fitted: PredictedWear) -> list[str]:
             "last frames; run the scene again with "
             f'wear.coefficient = "{PROPOSAL_FACTOR * value:.2g} m^2/N" and compare again.'
         )
-    if abs(fitted.proportional / value - 1) > MIN_COEFFICIENT_DIFFERENCE:
+    # Smallest relative difference of the proportional coefficient that is reported.
+    if abs(fitted.proportional / value - 1) > 0.01:
         notes.append(
             "The computed depth is not proportional to the coefficient, because the pressure changes with wear; the last "
             f"depth of the run in proportion would give {format_number(fitted.proportional, 4)} m^2/N."
@@ -427,7 +425,8 @@ def _find_place(run: PatchRun, number) -> str:
 def _describe_measures(runs: tuple[PatchRun, PatchRun]) -> list[str]:
     """Return the sentence with the main measures before and after; [] if there are none."""
     parts = []
-    for name in shared.COMPARED_MEASURES[:N_VERDICT_MEASURES]:
+    # First ones of COMPARED_MEASURES, which the verdict states
+    for name in shared.COMPARED_MEASURES[:3]:
         pair = [run.answer.quantities.get(name) for run in runs]
         if all(shared.is_known(number) for number in pair):
             first, second = (quantities.format_quantity(name, number) for number in pair)

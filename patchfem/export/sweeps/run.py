@@ -24,7 +24,6 @@ from .folder import Folder, Writer
 
 MAX_CASES_WITH_SUMMARY = 1000  # cases whose summaries are stored by default
 N_ROWS_PER_PART = 4096  # rows of sweep.csv whose cells are in memory at the same time
-MAX_CASES_WITH_TABLES = 200_000  # cases of which sweep.csv is written without --collect
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +188,8 @@ def write_tables(
 
     folder.remove_tables("sweep.csv", answers.PAGE_FILE)
     names = folder.list_case_folder_names()
-    if is_collected or len(table) <= MAX_CASES_WITH_TABLES:
+    # Cases of which sweep.csv is written without --collect
+    if is_collected or len(table) <= 200_000:
         write_csv(cases, table, names, folder.target / "sweep.csv")
     answers.write_answer(make_sweep_answer(sweep_scene, cases, table, names), folder.target)
     del table  # its memory is needed for the page, which is made from the files

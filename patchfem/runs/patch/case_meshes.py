@@ -254,6 +254,8 @@ class _CaseSolver:
         level = make_level(self.patch_model, pair)
         goes_on = np.ones(numbers.size, bool)
         parts = []
+
+        # A case that cannot be pressed, or that meets its tolerance, is not pressed on the next mesh.
         for rows in _split_rows(numbers.size, level):
             part = before.take(rows)
             start = np.zeros((rows.size, level.x.size), bool)
@@ -261,6 +263,8 @@ class _CaseSolver:
                 start = part.places.find_sets(level.x)
             pressed, errors = press_on_level(level, self.cases.take(part.numbers), start)
             values = collect_mesh_values(pressed)
+
+            # Contacts of the cases that go on grade the meshes of their groups.
             if is_judged:
                 series = [*part.series, values]
                 goes_on[rows] = self._keep_measures(part.numbers, pressed, series, errors)
@@ -270,8 +274,10 @@ class _CaseSolver:
             for row, error in errors.items():
                 goes_on[rows[row]] = False
                 self.batch.fail(int(part.numbers[row]), error)
+
             parts.append((values, find_contact_places(pressed)))
             level.limit_sets(MAX_TABLE_SETS)
+
         values, places = zip(*parts)
         series = [*before.series, join_mesh_values(values)]
         return OpenCases(numbers, join_places(places), series).take(goes_on)

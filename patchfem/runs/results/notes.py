@@ -17,12 +17,8 @@ from ...formatting import format_length, format_quantity
 # Largest relative difference of the friction works from samples and from energies without a
 # warning.
 MAX_WORK_CHECK = 1e-3
-# Largest ratio of created to exchanged energy without a warning.
-MAX_CREATED_ENERGY_FRACTION = 1e-6
 # Largest ratio of the slip during the formation of a bond to the bond length without a warning.
 MAX_BOND_FORMING_SLIP_RATIO = 0.3
-# Smallest excess of the friction force over mu_s N, relative to it, that a note reports.
-MIN_REPORTED_FORCE_EXCESS_RATIO = 1e-3
 # Largest ratio of the slip in one time step to the slide of the holders in it without a warning of a sudden slip.
 MAX_SLIP_PER_SLIDE = 10.0
 MAX_PROPOSED_HALVINGS = 8  # Largest number of halvings of the time step that a warning proposes.
@@ -87,7 +83,8 @@ def _warn_of_created_energy(run) -> Iterator[str]:
         return
     created = run.solution.run.ledger.get("created", 0.0)
     exchanged = run.solution.run.ledger.get("passed", 0.0)
-    if created > MAX_CREATED_ENERGY_FRACTION * exchanged:
+    # Largest ratio of created to exchanged energy without a warning.
+    if created > 1e-6 * exchanged:
         percent = 100 * created / exchanged
         yield (
             f"the law as printed in the report created {created:.3g} J, which is {percent:.2g} % of the work "
@@ -188,7 +185,8 @@ def _note_on_growth(run) -> Iterator[str]:
             "friction.order <= 1 to keep friction near mu_s N"
         )
     force_ratio = run.find_force_ratio()
-    if force_ratio > 1 + MIN_REPORTED_FORCE_EXCESS_RATIO:
+    # Smallest excess of the friction force over mu_s N, relative to it, that a note reports.
+    if force_ratio > 1 + 1e-3:
         yield (
             f"the friction force reaches {force_ratio:.3g} times mu_s N: the bond length grows during the run, and "
             "bonds that formed while the bond length was small then break later; to keep the friction force at "

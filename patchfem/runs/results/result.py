@@ -28,8 +28,6 @@ from . import patch_rows
 from .patch_rows import Arrays, Measures, Values
 
 N_INTERFACE_FRAMES = 16  # Number of frames of the interface fields in the last cycle.
-# Change of slip / largest change; above it, a node without friction limit slips.
-MIN_SLIP_CHANGE_FRACTION = 1e-2
 TRACTION_ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
 # Outcomes of motions without a periodic cycle.
 UNBOUNDED_OUTCOMES = (
@@ -388,7 +386,8 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP_RULE) -> np.ndarray:
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
     if not rule.starts_at_rest:
         moved[1] = 0.0
-    min_fraction = MIN_SLIP_CHANGE_FRACTION if rule.limit is None else TRACTION_ROUND_OFF
+    # Change of slip / largest change; above it, a node without friction limit slips.
+    min_fraction = 1e-2 if rule.limit is None else TRACTION_ROUND_OFF
     slips = moved > min_fraction * max(moved.max(), 1e-300)
     if rule.limit is not None and not rule.starts_at_rest:
         slips[1] = np.abs(tau[1]) >= (1 - TRACTION_ROUND_OFF) * rule.limit

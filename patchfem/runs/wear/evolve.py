@@ -40,9 +40,6 @@ from .slip import (
 
 # Largest remaining fraction of the coating thickness at which the coating counts as worn through.
 WORN_THROUGH_FRACTION = 1e-6
-# Smallest distance to the next row of the friction table, relative to the row spacing, at which a
-# jump ends at this row.
-MIN_FRICTION_ROW_DISTANCE_RATIO = 0.1
 
 
 class WearMoment(NamedTuple):
@@ -201,9 +198,9 @@ class _Wear:
             rows = [row for row in wear.friction.depth if row > depth]
         if not rows:
             return np.inf
-        is_near = len(rows) > 1 and rows[0] - depth < MIN_FRICTION_ROW_DISTANCE_RATIO * (
-            rows[1] - rows[0]
-        )
+        # Smallest distance to the next row of the friction table, relative to the row spacing, at
+        # which a jump ends at this row.
+        is_near = len(rows) > 1 and rows[0] - depth < 0.1 * (rows[1] - rows[0])
         return state.cycle + (rows[is_near] - depth) / rate
 
     def record(self, patch, state: WearState) -> WearMoment:

@@ -27,9 +27,6 @@ from .evolve import (
 from .slip import compute_point_slip_path
 
 N_WEAR_FRAMES = 24  # Number of frames of the interface during the wear.
-# Largest ratio of the worn depth to the thickness of a coating, or to the height of a piece, at
-# which the stiffness of the unworn piece is valid.
-MAX_WORN_THICKNESS_FRACTION = 0.2
 WORN_ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
 # Note on the wear of a trace whose short waves are represented by asperities
 SPLIT_TRACE_NOTE = (
@@ -155,7 +152,9 @@ def _warn_of_worn_depth(model, evolved) -> list[str]:
     warnings = []
     for worn in list_worn_pieces(model, evolved.state.depth):
         size = "the thickness of its coating" if worn.piece.coating else "its height"
-        if worn.depth > MAX_WORN_THICKNESS_FRACTION * (worn.piece.thickness or worn.piece.height):
+        # Largest ratio of the worn depth to the thickness of a coating, or to the height of a
+        # piece, at which the stiffness of the unworn piece is valid.
+        if worn.depth > 0.2 * (worn.piece.thickness or worn.piece.height):
             warnings.append(
                 f"up to {format_length(worn.depth, 3)} is worn off the {worn.name} piece, more than 0.2 of {size}, but the "
                 "computation still uses the stiffness of the unworn piece"

@@ -23,9 +23,6 @@ from ..rig import engines, fields, rig, slides
 
 MIN_CYCLE_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_CYCLE_FRAMES = 800  # Largest number of interface frames per cycle.
-# Ratio of the error due to reversals between samples to the mean change of the path if only every
-# third sample is used.
-SLIP_PATH_REVERSAL_ERROR_FACTOR = 1.5
 
 
 class CycleSlip(NamedTuple):
@@ -111,7 +108,9 @@ class _PointSlip(NamedTuple):
         for first in range(3):
             samples = np.unique([*ends, *range(first, count, 3)]).astype(int)
             changes.append(abs(float((path - self.integrate_path(samples)) @ force)))
-        return SLIP_PATH_REVERSAL_ERROR_FACTOR * float(np.mean(changes)) / total
+        # Ratio of the error due to reversals between samples to the mean change of the path if only
+        # every third sample is used.
+        return 1.5 * float(np.mean(changes)) / total
 
 
 def choose_frame_count(tolerance: float) -> int:

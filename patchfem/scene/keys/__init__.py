@@ -3,8 +3,8 @@
 The attribute is the only place where a key is described, and everything that reads, checks or documents scenes is made
 from it. Read `tables` first: it holds all tables but those under [contact] (`contact`) and [accuracy] (`accuracy`).
 `types` has the types of keys, `quantities` the units of each kind of quantity, `materials` the named materials,
-`choices` says which keys a table needs, takes and excludes, `lookup` finds a dotted key, and `removed` has the sentences
-about keys and options of earlier versions.
+`choices` says which keys a table needs, takes and excludes, `lines` splits dotted keys and finds their lines in a text,
+`lookup` finds the type of a dotted key, and `removed` has the sentences about keys and options of earlier versions.
 
 How to add a key
 ----------------

@@ -10,9 +10,9 @@ from typing import NamedTuple, get_args, get_origin
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from ..lines import split_key
 from . import quantities
 from .contact import MATERIAL_REQUIREMENT, Material
+from .lines import split_key
 from .tables import Structure, Tables
 from .types import Key, KeyType, KeyValue, Table, advise_on_name, list_keys
 from .values import TomlTable, TomlValue

@@ -15,14 +15,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 IGNORED_SEPARATORS_PATTERN = r"[\s_-]"  # characters that are ignored in the name of a material
-MAX_PROPOSED_MATERIALS = 3  # largest number of materials that are proposed for an unknown name
-# Smallest number of characters for which the beginning of a name is compared
-MIN_MATERIAL_PREFIX_LENGTH = 3
-# Names with another meaning in other letter case: tin is a metal of about 50 GPa.
-CASE_SENSITIVE_NAMES = ("TiN",)
-# Smallest similarity ratio (difflib) for a proposal; below it, the
-# numbers of all steels look alike.
-MIN_MATERIAL_NAME_SIMILARITY = 0.7
 
 
 class YieldStrength(NamedTuple):
@@ -90,7 +82,8 @@ def find_material_name(written_name: str) -> str | None:
 
 def is_case_sensitive(spelling: str) -> bool:
     """Return whether a normalised spelling denotes a material only in the letter case of its name."""
-    return spelling in map(str.casefold, CASE_SENSITIVE_NAMES)
+    # Names with another meaning in other letter case: tin is a metal of about 50 GPa.
+    return spelling in map(str.casefold, ("TiN",))
 
 
 def advise_on_material(written_name: str) -> str:
@@ -100,13 +93,15 @@ def advise_on_material(written_name: str) -> str:
     """
     spellings = list_spellings()
     written = normalise_material_name(written_name)
-    near_spellings = get_close_matches(
-        written, spellings, len(spellings), MIN_MATERIAL_NAME_SIMILARITY
-    )
-    if len(written) >= MIN_MATERIAL_PREFIX_LENGTH:
+    # Smallest similarity ratio (difflib) for a proposal; below it, the numbers of all steels look
+    # alike.
+    near_spellings = get_close_matches(written, spellings, len(spellings), 0.7)
+    # Smallest number of characters for which the beginning of a name is compared
+    if len(written) >= 3:
         longer = [spelling for spelling in spellings if spelling.startswith(written)]
         near_spellings = [*longer, *near_spellings]
     near_names = list(dict.fromkeys(spellings[spelling] for spelling in near_spellings))
-    quoted_names = " or ".join(f"'{name}'" for name in near_names[:MAX_PROPOSED_MATERIALS])
+    # Largest number of materials that are proposed for an unknown name
+    quoted_names = " or ".join(f"'{name}'" for name in near_names[:3])
     question = f"did you mean {quoted_names}? " if near_names else ""
     return f"{question}use one of {', '.join(MATERIALS)}"

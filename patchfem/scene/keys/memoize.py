@@ -4,9 +4,6 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
-# Number of results of one function at which its cache is emptied.
-MAX_CACHED_QUANTITIES = 1024
-
 
 def memoize(function: Callable[..., Any]) -> Callable[..., Any]:
     """Cache the results of a function by the identity of its first argument.
@@ -21,7 +18,8 @@ def memoize(function: Callable[..., Any]) -> Callable[..., Any]:
         """Return the cached result for this very object `frozen` and equal other arguments."""
         entry = results.get((id(frozen), *others))
         if entry is None:
-            if len(results) >= MAX_CACHED_QUANTITIES:
+            # Number of results of one function at which its cache is emptied.
+            if len(results) >= 1024:
                 results.clear()
             # The entry keeps the object alive; otherwise another object could get the same id.
             entry = (frozen, function(frozen, *others))

@@ -47,6 +47,8 @@ LawName = Literal[tuple(LAWS)]
 WaveName = Literal[tuple(WAVEFORMS)]
 MAX_MASS_NUMBER = 1_000_000  # largest number of a mass in a key
 MAX_MATRIX_ROW_NUMBER = 2_000_000  # largest row of a matrix in a key
+# File name extensions of universal files, by which every reader knows them
+UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
 
 
 class Normal(Table):

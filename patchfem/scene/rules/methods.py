@@ -98,8 +98,6 @@ class EngineSupport(NamedTuple):
     features: str
 
 
-# Laws of the engine `event_driven` under a load that varies in time.
-VARYING_LAWS = ("coulomb", "tanh", "elastic-plastic")
 # Features that each engine of a rig supports; `runs.rig.engines` refers to these names. The rows "exact" and "piecewise"
 # are the maps of a period by which a steady motion is found.
 ENGINE_SUPPORT = {
@@ -186,7 +184,8 @@ def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     if motion.load_change:
         # Regimes of the elastic-plastic law have springs that come and go with the load.
         is_fixed = joint.law.stiffness and law_takes_stiffness_or_length(law)
-        return law in VARYING_LAWS and not is_fixed
+        # Laws of the engine `event_driven` under a load that varies in time.
+        return law in ("coulomb", "tanh", "elastic-plastic") and not is_fixed
     return not (motion.lower_shape or joint.is_uneven)
 
 

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from functools import cached_property, lru_cache
 
 from ...exceptions import PatchfemError
+from ..keys.lines import find_key_lines, find_line, number_items_from_one
 from ..keys.lookup import describe_missing_key, find_key
 from ..keys.tables import Tables
 from ..keys.types import Table, build_table
 from ..keys.values import TomlTable, TomlValue
-from ..lines import find_key_lines, find_line, number_items_from_one
 from .view import TableView
 
 # Sort order of mistakes in --set, which are listed after those of all lines of a file.

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..files import UNIVERSAL_EXTENSIONS
-from ..keys.tables import Tables
+from ..keys.tables import UNIVERSAL_EXTENSIONS, Tables
 from ..keys.types import advise_on_name
 from .facts import TableFacts
 from .scene_draft import SceneDraft

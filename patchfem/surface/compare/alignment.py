@@ -21,37 +21,17 @@ from .statistics import (
 
 # Largest number of points to which the place is fitted. More would hardly improve it.
 MAX_FIT_POINTS = 40_000
-# Smallest part of the sampled surface that both surfaces must show
-MIN_COMMON_PART = 0.2
-# Largest relative difference in length of two traces at the same place
-MAX_RELATIVE_STRETCH = 0.015
 TRIED_DATUM_TERM_COUNTS = {1: (2, 3), 2: (3,)}  # numbers of terms of the datums that are tried
-# Noise about a parabola relative to that about a line, from which on the parabola is subtracted.
-PARABOLA_NOISE_RATIO = 0.8
-# Noise about a parabola relative to that about a line below which the parabola is subtracted even if it leaves heights
-# above the first trace: then no line fits at all
-CLEAR_PARABOLA_NOISE_RATIO = 0.2
-# Noise about a parabola relative to that about a line above which the parabola takes worn heights for the datum
-MAX_PARABOLA_NOISE_RATIO = 1.5
-# Fraction of the heights above the first trace that a parabola may add
-MAX_GROWTH_FRACTION_BY_PARABOLA = 0.01
 # Significance of the correlation at a place above which the place is sure without other evidence
 SURE_SIGNIFICANCE = 12.0
-# Significance of the correlation at a place that suffices if enough heights agree, too
-LIKELY_SIGNIFICANCE = 6.0
-# Smallest fraction, of the heights that do not agree by chance, that must agree at a likely place
-MIN_EXCESS_AGREEMENT_FRACTION = 0.2
 # Smallest fraction of heights that agree, relative to that of unrelated surfaces, at a place of low significance
 MIN_AGREEMENT_OVER_CHANCE = 3.0
 # Fraction of heights that must agree in addition to MIN_AGREEMENT_OVER_CHANCE times that of unrelated surfaces
 MIN_EXTRA_AGREEMENT = 0.05
 N_CHANCE_PLACES = 15  # number of other places that show how many heights agree by chance
-MIN_DEPTH_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat surfaces have none
 ROUNDING_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
 CALIBRATED_GAIN_DEVIATION = 0.01  # standard deviation of the gain of two calibrated measurements
-N_GAIN_STEPS = 2  # number of steps in which the gain is found
 N_GAIN_TILES = {1: 40, 2: 8}  # number of tiles along each side that show the error of the gain
-MIN_GAIN_DEVIATIONS = 3.0  # smallest change of the gain that is corrected, in standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +83,8 @@ def align(
         return _refuse(first, second)
 
     digit = ROUNDING_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
-    digit = max(digit, MIN_DEPTH_NOISE)
+    # Smallest standard deviation of a depth [m]; flat surfaces have none
+    digit = max(digit, 1e-15)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
     fit, gain_error = _fit_gain(model, fit, digit)
     aligned = Aligned("", None, model, fit, place, gain_error)
@@ -136,7 +117,8 @@ def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) ->
         stride = int(np.ceil((sampled.z.size / MAX_FIT_POINTS) ** (1 / sampled.z.ndim)))
     model = Model(sampled, other, place, stride)
     count = model.known.sum()
-    return model if count >= max(MIN_TRACE_HEIGHTS, MIN_COMMON_PART * model.known.size) else None
+    # Smallest part of the sampled surface that both surfaces must show
+    return model if count >= max(MIN_TRACE_HEIGHTS, 0.2 * model.known.size) else None
 
 
 def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: float) -> Aligned:
@@ -174,7 +156,8 @@ def _is_same_place(aligned: Aligned) -> bool:
     heights = (sampled, sampled - model.sign * fit.depth)
     waves = [remove_long_waves(fill_gaps(model.draw(z))) for z in heights]
     noise = float(np.median(fit.noise))
-    is_stretched = model.n_axes == 1 and abs(fit.state[1]) > MAX_RELATIVE_STRETCH
+    # Largest relative difference in length of two traces at the same place
+    is_stretched = model.n_axes == 1 and abs(fit.state[1]) > 0.015
     if is_stretched or noise > min(z[model.known].std() for z in waves):
         return False
     significance = aligned.place.significance
@@ -182,8 +165,11 @@ def _is_same_place(aligned: Aligned) -> bool:
         return True
     chance_fraction = _estimate_chance(*waves, noise)
     agreeing_fraction = fit.unworn.mean()
-    min_excess = MIN_EXCESS_AGREEMENT_FRACTION * (1 - chance_fraction)
-    if significance > LIKELY_SIGNIFICANCE and agreeing_fraction - chance_fraction > min_excess:
+    # Smallest fraction, of the heights that do not agree by chance, that must agree at a likely
+    # place
+    min_excess = 0.2 * (1 - chance_fraction)
+    # Significance of the correlation at a place that suffices if enough heights agree, too
+    if significance > 6.0 and agreeing_fraction - chance_fraction > min_excess:
         return True
     return agreeing_fraction > MIN_AGREEMENT_OVER_CHANCE * chance_fraction + MIN_EXTRA_AGREEMENT
 
@@ -231,11 +217,18 @@ def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
 def _is_bent(straight: Fit, bent: Fit) -> bool:
     """Return whether a parabolic datum, the fit `bent`, explains the depths better than a straight one."""
     gain = np.median(bent.noise) / np.median(straight.noise)
-    if gain < CLEAR_PARABOLA_NOISE_RATIO:
+    # Noise about a parabola relative to that about a line below which the parabola is subtracted
+    # even if it leaves heights above the first trace: then no line fits at all
+    if gain < 0.2:
         return True
-    has_grown = bent.grown.mean() > straight.grown.mean() + MAX_GROWTH_FRACTION_BY_PARABOLA
-    is_simpler = bent.n_changed < straight.n_changed / 2 and gain < MAX_PARABOLA_NOISE_RATIO
-    return bool((gain < PARABOLA_NOISE_RATIO or is_simpler) and not has_grown)
+    # Fraction of the heights above the first trace that a parabola may add
+    has_grown = bent.grown.mean() > straight.grown.mean() + 0.01
+    # Noise about a parabola relative to that about a line above which the parabola takes worn
+    # heights for the datum
+    is_simpler = bent.n_changed < straight.n_changed / 2 and gain < 1.5
+    # Noise about a parabola relative to that about a line, from which on the parabola is
+    # subtracted.
+    return bool((gain < 0.8 or is_simpler) and not has_grown)
 
 
 def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
@@ -258,13 +251,15 @@ def _fit_gain(model: Model, fit: Fit, digit: float) -> tuple[Fit, float]:
         Standard deviation of the gain [1].
     """
     scaled = fit
-    for _ in range(N_GAIN_STEPS):
+    # Number of steps in which the gain is found
+    for _ in range(2):
         change, error = _estimate_gain(model, scaled)
         state = scaled.state.copy()
         state[-1] = np.clip(state[-1] + change, -MAX_GAIN_CHANGE, MAX_GAIN_CHANGE)
         scaled = fit_unworn(model, state, fit.free, digit)
     gain = abs(float(scaled.state[-1]))
-    is_clear = MIN_GAIN_DEVIATIONS * error < gain < MAX_GAIN_CHANGE
+    # Smallest change of the gain that is corrected, in standard deviations
+    is_clear = 3.0 * error < gain < MAX_GAIN_CHANGE
     error = min(error if is_clear else float(np.hypot(error, gain)), CALIBRATED_GAIN_DEVIATION)
 
     # With a known gain, tops that are a little deeper than the valleys are worn.

@@ -15,8 +15,6 @@ from .statistics import (
 
 # Sides in samples of the windows whose mean depth is tested, by number of axes
 WINDOW_SIDES = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}
-# Side in samples of the smallest changed part of scans. A smaller one may be an error of interpolation.
-MIN_CHANGED_SCAN_SIDE = 4
 # Length in samples of the smallest changed part of traces: an error of interpolation at a kink spreads over 7 samples,
 # and one more on each side
 MIN_CHANGED_TRACE_SAMPLES = 9
@@ -28,7 +26,6 @@ MAX_DEPTH_DEVIATIONS = {1: 4.0, 2: 8.0}
 # Fraction of the means above or below zero that are unchanged at least.
 MIN_UNCHANGED_FRACTION = {1: 0.5, 2: 0.25}
 N_TRACE_PARTS = 60  # parts of the trace whose means show a shallow track
-MIN_SHALLOW_FLANK_PARTS = 5  # smallest number of parts on either side of a shallow track
 MIN_SHALLOW_TRACK_PARTS = 3  # smallest number of parts in a shallow track
 ADDED_DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
 # Smallest height of a shallow track in standard deviations; 2 % of random walks have a deeper one.
@@ -81,7 +78,9 @@ def find_changed(depth, noise) -> np.ndarray:
             changed |= ndimage.binary_dilation(high, np.ones((side,) * depth.ndim))
 
     # A trace may have a track too shallow for any window. Groups of points too small for a change are left out.
-    side = MIN_CHANGED_SCAN_SIDE
+    # Side in samples of the smallest changed part of scans. A smaller one may be an error of
+    # interpolation.
+    side = 4
     if depth.ndim == 1:
         places = np.flatnonzero(known)
         shallow = find_shallow_track(np.clip(depth, -pull * noise, pull * noise)[known])
@@ -145,7 +144,8 @@ def find_shallow_track(depth) -> ShallowTrack:
         return ShallowTrack(slice(0), MIN_SHALLOW_TRACK_DEVIATIONS * float(depth.std()))
     edges = np.linspace(0, depth.size, N_TRACE_PARTS + 1).astype(int)
     means = np.add.reduceat(depth, edges[:-1]) / np.diff(edges)
-    boxes = make_boxes(ADDED_DATUM_DEGREE, MIN_SHALLOW_FLANK_PARTS, MIN_SHALLOW_TRACK_PARTS)
+    # Smallest number of parts on either side of a shallow track
+    boxes = make_boxes(ADDED_DATUM_DEGREE, 5, MIN_SHALLOW_TRACK_PARTS)
     means = means - boxes.datum @ (boxes.datum.T @ means)
     heights = boxes.shapes @ means
     best = int(np.argmax(heights))

@@ -40,23 +40,13 @@ from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 
 # Number of lines of points at an end of a surface in which growth counts as growth at this end
 N_END_LINES = 7
-# Fraction of the points of a line near an end above which the end has grown
-MIN_GROWN_LINE_FRACTION = 0.5
 # Side in samples of the square by which worn places of scans are enlarged, so that flanks count
 WORN_MARGIN_SIDE = 7
-# Width of a track relative to the common part, beyond which it may be growth at its ends.
-MAX_TRACK_FRACTION = 0.8
-# Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops are worn, it is smaller.
-MIN_SCAR_FRACTION = 0.9
 # Mean height of a bow relative to the short waves, from which on it may be a scar. Instruments have lower ones.
 MIN_BOW_TO_WAVES_RATIO = 1.0
 # Area of a bow relative to the worn area, from which on the verdict depends on whether the bow is a scar
 MIN_BOW_TO_WORN_RATIO = 0.5
-# Fraction of the depths of a trace that a step of the datum must explain within the noise; the others may be spikes
-MIN_STEP_FRACTION = 0.9
 MIN_REPORTED_LENGTH_ERROR = 5e-4  # smallest error of length that is reported
-# Fraction of worn heights in a track below which it consists of worn tops.
-MIN_WORN_TRACK_FRACTION = 0.6
 
 
 class Names(NamedTuple):
@@ -359,7 +349,8 @@ def _collect_findings(
     # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
     bow = abs(bend)
     bow_area = bow * (2 if bend > 0 else 1) / 3 * float(np.ptp(depths.x))
-    has_tops = bool(tracks) and _is_broken(depths, find_spans(depths)[0], MIN_WORN_TRACK_FRACTION)
+    # Fraction of worn heights in a track below which it consists of worn tops.
+    has_tops = bool(tracks) and _is_broken(depths, find_spans(depths)[0], 0.6)
     known = placement.values.get("significance")
     significance = known.value if known else np.inf
 
@@ -477,8 +468,11 @@ def _doubt(
     if code == "scar_or_drift":
         return code, {"scar_depth": area / depths.size}
     if is_worn and not is_cut:
-        is_wide = tracks[0].values["width"].value > MAX_TRACK_FRACTION * depths.size
-        if is_wide and not _is_broken(depths, spans[0], MIN_SCAR_FRACTION):
+        # Width of a track relative to the common part, beyond which it may be growth at its ends.
+        is_wide = tracks[0].values["width"].value > 0.8 * depths.size
+        # Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops
+        # are worn, it is smaller.
+        if is_wide and not _is_broken(depths, spans[0], 0.9):
             height = tracks[0].values["depth_mean"].value
             return "growth_at_ends", {"scar_depth": area / depths.size, "growth_height": height}
     if is_worn and len(spans) == 1 and sum(tracks[0].cut) == 1:
@@ -518,7 +512,9 @@ def _find_step(depths: DepthMap, *, at_end: bool) -> float:
     residual[depth.size - 1 - int(np.argmax(gain)) :] -= height
     # Where half of the heights changed, as by the loss of all tops, the scatter of the depths hides single changes.
     is_noise = np.abs(residual) <= MAX_DEPTH_DEVIATIONS[1] * noise
-    if is_noise.mean() < MIN_STEP_FRACTION:
+    # Fraction of the depths of a trace that a step of the datum must explain within the noise; the
+    # others may be spikes
+    if is_noise.mean() < 0.9:
         return 0.0
     has_other_change = find_changed(residual, noise).any() or find_changed(-residual, noise).any()
     return 0.0 if has_other_change else height
@@ -534,7 +530,8 @@ def _has_grown_at_ends(depths: DepthMap) -> bool:
         others = tuple(axes - {axis})
         counts = depths.inside.sum(axis=others)
         grown = depths.grown.sum(axis=others)[counts > 0] / counts[counts > 0]
-        if max(grown[:N_END_LINES].max(), grown[-N_END_LINES:].max()) > MIN_GROWN_LINE_FRACTION:
+        # Fraction of the points of a line near an end above which the end has grown
+        if max(grown[:N_END_LINES].max(), grown[-N_END_LINES:].max()) > 0.5:
             return True
     return False
 

@@ -22,20 +22,11 @@ from .statistics import MIN_DIVISOR, estimate_correlation, find_box, split_tiles
 
 # Number of tiles along each side, whose means show the errors of the datum
 N_DATUM_ERROR_TILES = {1: 40, 2: 8}
-# Smallest number of tiles that show the errors of the datum
-MIN_DATUM_ERROR_TILES = 6
 # Smallest number of independent tiles, as the correlation of few tiles is uncertain
 MIN_INDEPENDENT_TILES = 3.0
-# Smallest number of unworn heights in a tile that shows the errors of the datum
-MIN_DATUM_TILE_HEIGHTS = 5
 # Distance from the largest mean, in its standard deviations, within which other means are counted as equally deep
 NEAR_DEVIATIONS = 2.0
-N_TRIED_COUNTS = 200  # number of numbers of equally deep places that are compared with what is seen
 MEDIAN_SIDE = {1: 5, 2: 3}  # side of the window whose median leaves outliers out, by number of axes
-# Variance of the median of normal errors relative to that of their mean, pi/2
-MEDIAN_TO_MEAN_VARIANCE = 1.57
-# Noise relative to the median above which a depth cannot be the largest
-MAX_DEPTH_NOISE_RATIO = 4.0
 
 
 def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
@@ -162,7 +153,8 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     tiles = []
     for tile in split_tiles(depth.shape, N_DATUM_ERROR_TILES[depth.ndim]):
         use = unworn[tile]
-        if use.sum() >= MIN_DATUM_TILE_HEIGHTS:
+        # Smallest number of unworn heights in a tile that shows the errors of the datum
+        if use.sum() >= 5:
             parts = [values[tile][use].mean() for values in (depth, *base)]
             tiles.append((use.sum(), *parts))
     counts, means, *centers = np.array(tiles).T if tiles else np.zeros((2 + len(base), 1))
@@ -175,7 +167,8 @@ def estimate_errors(depth, noise, unworn, base, shifts=()) -> DepthErrors:
     )
     freedom = MIN_INDEPENDENT_TILES
     drift = 0.0
-    if counts.size >= MIN_DATUM_ERROR_TILES:
+    # Smallest number of tiles that show the errors of the datum
+    if counts.size >= 6:
         # The scatter of the means about the datum that fits them best gives s^2.
         fitted = np.linalg.lstsq(centers, means * root, rcond=None)[0]
         residual = means * root - centers @ fitted
@@ -260,7 +253,8 @@ def _find_extreme(depth, noise, side: int, correlation: float) -> Extreme:
     # Of n independent normal values about one level, n Q(t - NEAR_DEVIATIONS) are within NEAR_DEVIATIONS of the largest,
     # where Q is the upper tail and t the median of the largest value.
     n_near = float((means > means[at] - NEAR_DEVIATIONS * sigma).sum()) / n_shared
-    counts = np.geomspace(1.0, means.size, N_TRIED_COUNTS)
+    # Number of numbers of equally deep places that are compared with what is seen
+    counts = np.geomspace(1.0, means.size, 200)
     largest = special.ndtri(0.5 ** (1 / counts))
     n_expected = counts * special.ndtr(NEAR_DEVIATIONS - largest)
     n_places = float(np.interp(n_near, n_expected, counts))
@@ -288,7 +282,8 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
         Mask in the shape of the depths of the places that are as deep but for the noise.
     """
     n_axes = depths.depth.ndim
-    is_sure = depths.noise < MAX_DEPTH_NOISE_RATIO * depths.noise_level
+    # Noise relative to the median above which a depth cannot be the largest
+    is_sure = depths.noise < 4.0 * depths.noise_level
     if (is_sure & depths.worn).any():
         is_sure &= depths.worn
     depth = np.where(is_sure, depths.depth, np.minimum(depths.depth, 0.0))
@@ -298,7 +293,8 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
 
     # Medians leave single outliers out, and scatter a little more than means.
     medians = ndimage.median_filter(depth, MEDIAN_SIDE[n_axes])
-    noise = np.sqrt(MEDIAN_TO_MEAN_VARIANCE) * depths.noise
+    # Variance of the median of normal errors relative to that of their mean, pi/2
+    noise = np.sqrt(1.57) * depths.noise
     wide = [_find_extreme(medians, noise, side, correlation) for side in sides[1:]]
     # The best one of several windows is chosen, as if there were as many times more places.
     lowest = [each.value - each.find_noise(0.975, len(wide) * each.n_places) for each in wide]

@@ -15,13 +15,7 @@ from .statistics import (
     solve_biweight_step,
 )
 
-MAX_FIT_CYCLES = 6  # number of alternations between the fit and the choice of the worn heights
-MAX_BIWEIGHT_STEPS = 15  # number of biweight steps in a cycle
-# Change of the depths, in standard deviations, below which the steps have converged.
-BIWEIGHT_STEP_TOL = 1e-3
 MIN_UNWORN_HEIGHTS = 50  # smallest number of heights that are not worn
-# Smallest noise of a height relative to the scale of all of them; a fit of the noise to the slopes may go below.
-MIN_NOISE_OVER_SCALE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,15 +73,18 @@ def fit_unworn(model: Model, state, free: list[int], digit: float) -> Fit:
     """
     fit = None
     worn = np.zeros(int(model.known.sum()), bool)
-    for _ in range(MAX_FIT_CYCLES):
-        for _ in range(MAX_BIWEIGHT_STEPS):
+    # Number of alternations between the fit and the choice of the worn heights
+    for _ in range(6):
+        # Number of biweight steps in a cycle
+        for _ in range(15):
             depth = model.compute_depth(state)
             sigma = max(estimate_one_sided_scale(depth[~worn]), digit)
             jacobian = model.compute_jacobian(state)[:, free]
             change = solve_biweight_step(depth, jacobian, sigma, worn)
             state = state.copy()
             state[free] += change
-            if max_abs(jacobian @ change) < BIWEIGHT_STEP_TOL * sigma:
+            # Change of the depths, in standard deviations, below which the steps have converged.
+            if max_abs(jacobian @ change) < 1e-3 * sigma:
                 break
         fit = evaluate(model, state, free, digit, worn)
         if (fit.worn == worn).all() or (~fit.worn).sum() < MIN_UNWORN_HEIGHTS:
@@ -160,7 +157,9 @@ def estimate_noise(depth, terms, sigma: float, worn) -> np.ndarray:
         factors = (
             solve_non_negative(terms[use] / scale * weight[:, None], variance * weight) / scale
         )
-        noise = np.sqrt(np.maximum(terms @ factors, (MIN_NOISE_OVER_SCALE * sigma) ** 2))
+        # Smallest noise of a height relative to the scale of all of them; a fit of the noise to the
+        # slopes may go below.
+        noise = np.sqrt(np.maximum(terms @ factors, (0.3 * sigma) ** 2))
     return noise
 
 

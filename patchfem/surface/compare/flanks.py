@@ -18,8 +18,6 @@ from .statistics import subtract_plane
 N_SHIFTED_COPIES = 50
 # Height of a track relative to the largest one in the copies of the first trace, above which it is not chance
 MIN_TRACK_OVER_CHANCE_HEIGHT = 1.2
-MIN_FLANK_PARTS = 6  # smallest number of parts of each flank
-MIN_PART_SAMPLES = 4  # smallest number of samples of a part
 
 
 def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
@@ -41,7 +39,8 @@ def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
     z = fill_gaps(second.z)
     step = float(second.steps[0])
     count = int(first.lengths[0] / step)
-    if min(z.size, count) < MIN_PART_SAMPLES * N_TRACE_PARTS:
+    # Smallest number of samples of a part
+    if min(z.size, count) < 4 * N_TRACE_PARTS:
         return None
     rough = np.interp(step * np.arange(count), first.axes[0] - first.origin[0], fill_gaps(first.z))
     rough = subtract_plane(rough, np.array([np.ones(count), np.linspace(-1, 1, count)]))
@@ -56,7 +55,8 @@ def find_flanked_track(first: Raster, second: Raster) -> DepthMap | None:
 
     edges = np.linspace(0, z.size, N_TRACE_PARTS + 1).astype(int)
     means, *others = np.add.reduceat([z, *traces], edges[:-1], axis=1) / np.diff(edges)
-    boxes = make_boxes(1, MIN_FLANK_PARTS, MIN_SHALLOW_TRACK_PARTS)
+    # Smallest number of parts of each flank
+    boxes = make_boxes(1, 6, MIN_SHALLOW_TRACK_PARTS)
     heights = -boxes.shapes @ means
     best = int(np.argmax(heights))
     if heights[best] <= MIN_TRACK_OVER_CHANCE_HEIGHT * max_abs(boxes.shapes @ np.array(others).T):

@@ -29,33 +29,14 @@ from .tops import find_worn_tops
 
 # Distance from the border of a surface from which on its spline is accurate
 INACCURATE_BORDER_SAMPLES = 3
-MIN_KNOWN_WEIGHT = 0.99  # weight of measured neighbours of a point whose height is known
-KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
 N_DATUM_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
 # Side of a surface relative to the standard deviation of a Gaussian. The waves longer than it are not used to refine the
 # place.
 SIDE_OVER_PLACE_GAUSSIAN = {1: 100, 2: 20}
-# Smallest standard deviation, in samples of a trace, of the Gaussian whose longer waves are not used to refine the
-# place
-MIN_PLACE_GAUSSIAN_SAMPLES = 10.0
 # Standard deviations in samples of the Gaussians that smooth both surfaces, one for each step that refines the place
 REFINING_GAUSSIAN_SAMPLES = (16, 8, 4, 3, 2, 1, 0, 0, 0)
 MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
-N_IMPROVED_DATUMS = 150  # number of datums that are improved by concentration steps
 MAX_COMPARED_DATUMS = 3000  # number of datums through modes of tiles that are compared
-MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
-MIN_MODE_TILE_HEIGHTS = 4  # smallest number of known heights in a tile
-# Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not determine a datum.
-MIN_DATUM_DETERMINANT = 1e-3
-# Scale of a datum, the distance within which a fifth of the depths lie, relative to the smallest one. Datums of larger
-# scale are not compared.
-MAX_DATUM_SCALE_RATIO = 4.0
-# Fraction of the heights at an end that agree, if the end is unworn
-MIN_AGREEING_END_FRACTION = 0.7
-# Distance of a height from a datum, relative to the smallest scale, within which it agrees with the datum
-MAX_AGREEING_DISTANCE_IN_SCALES = 5.0
-# Distance of a height above a datum, relative to the smallest scale, from which on it has grown
-MIN_GROWN_DISTANCE_IN_SCALES = 10.0
 
 
 class Model:
@@ -86,7 +67,8 @@ class Model:
         self.gradient = [
             np.gradient(filled, step, axis=axis) for axis, step in enumerate(other.steps)
         ]
-        self.bend = ndimage.maximum_filter(np.abs(ndimage.laplace(filled)), KINK_SAMPLES)
+        # Number of samples over which an error of interpolation at a kink spreads
+        self.bend = ndimage.maximum_filter(np.abs(ndimage.laplace(filled)), 7)
 
         self.middle = self._shape(sampled.middle)
         points = np.array(np.meshgrid(*sampled.axes, indexing="ij")) - self.middle
@@ -118,7 +100,8 @@ class Model:
         pixels = self._map_pixels(state)
         measured = np.isfinite(self.other.z).astype(float)
         weights = ndimage.map_coordinates(measured, pixels, order=1, cval=0.0)
-        self.common = np.isfinite(self.sampled.z) & (weights > MIN_KNOWN_WEIGHT)
+        # Weight of measured neighbours of a point whose height is known
+        self.common = np.isfinite(self.sampled.z) & (weights > 0.99)
         last = self._shape(self.other.z.shape) - 1 - INACCURATE_BORDER_SAMPLES
         self.known = self.common & ((pixels >= INACCURATE_BORDER_SAMPLES) & (pixels <= last)).all(
             axis=0
@@ -222,7 +205,9 @@ class Model:
     def smoothing(self) -> np.ndarray:
         """Standard deviations (d,), in samples, of the Gaussian that removes the long waves when the position is refined."""
         sizes = np.array(self.sampled.z.shape) / SIDE_OVER_PLACE_GAUSSIAN[self.n_axes]
-        return np.maximum(sizes, MIN_PLACE_GAUSSIAN_SAMPLES) if self.n_axes == 1 else sizes
+        # Smallest standard deviation, in samples of a trace, of the Gaussian whose longer waves are
+        # not used to refine the place
+        return np.maximum(sizes, 10.0) if self.n_axes == 1 else sizes
 
     def _filter(self, values, width: float) -> np.ndarray:
         """Return values (n,) smoothed by a Gaussian and without their long waves.
@@ -239,7 +224,8 @@ class Model:
         """
         numbers = self.draw(np.arange(self.known.sum()), -1)[find_box(self.known)]
         parts = [numbers[part] for part in split_tiles(numbers.shape, N_DATUM_TILES[self.n_axes])]
-        tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= MIN_MODE_TILE_HEIGHTS]
+        # Smallest number of known heights in a tile
+        tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= 4]
         ends = [tiles[0], tiles[-1]] if self.n_axes == 1 else []
         state = state.copy()
         base = self.datum[:n_terms, self.known].T
@@ -272,16 +258,20 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     centers = np.array([base[tile].mean(axis=0) for tile in tiles])
     subsets = np.array(list(combinations(range(len(tiles)), base.shape[1])))
     subsets = subsets[random.permutation(len(subsets))[:MAX_COMPARED_DATUMS]]
-    subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > MIN_DATUM_DETERMINANT]
+    # Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not
+    # determine a datum.
+    subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > 1e-3]
     datums = np.linalg.solve(centers[subsets], -modes[subsets][..., None])[..., 0]
 
     # Their scale is the distance within which a fifth of some heights lie
-    thin = np.arange(0, depth.size, max(depth.size // MAX_DATUM_SAMPLES, 1))
+    # Number of heights from which the datum is found
+    thin = np.arange(0, depth.size, max(depth.size // 2000, 1))
     few_base = base[thin]
     few = depth[thin]
     # A quarter of the heights shows which datums are worth improving.
     scales = _scale_datums(datums, few_base[::4], few[::4])
-    datums = datums[np.argsort(scales)[:N_IMPROVED_DATUMS]]
+    # Number of datums that are improved by concentration steps
+    datums = datums[np.argsort(scales)[:150]]
     # Concentration step: a least-squares fit to the fifth of the heights that are nearest to the datum
     for _ in range(2):
         residual = np.abs(few + datums @ few_base.T)
@@ -293,14 +283,20 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
 
     # Of the datums with a small scale the best one is taken: with an unworn end, few heights above it, and many on it
     scales = _scale_datums(datums, few_base, few)
-    near = np.flatnonzero(scales <= MAX_DATUM_SCALE_RATIO * scales.min())
+    # Scale of a datum, the distance within which a fifth of the depths lie, relative to the
+    # smallest one. Datums of larger scale are not compared.
+    near = np.flatnonzero(scales <= 4.0 * scales.min())
     relative = (few + datums[near] @ few_base.T) / max(scales.min(), 1e-15)
-    agrees = np.abs(relative) < MAX_AGREEING_DISTANCE_IN_SCALES
+    # Distance of a height from a datum, relative to the smallest scale, within which it agrees with
+    # the datum
+    agrees = np.abs(relative) < 5.0
     has_end = np.zeros(near.size, bool)
     for end in ends:
         at_end = agrees[:, np.isin(thin, end)]
-        has_end |= at_end.sum(axis=1) > MIN_AGREEING_END_FRACTION * at_end.shape[1]
-    grown = np.round((relative < -MIN_GROWN_DISTANCE_IN_SCALES).mean(axis=1), 1)
+        # Fraction of the heights at an end that agree, if the end is unworn
+        has_end |= at_end.sum(axis=1) > 0.7 * at_end.shape[1]
+    # Distance of a height above a datum, relative to the smallest scale, from which on it has grown
+    grown = np.round((relative < -10.0).mean(axis=1), 1)
     return datums[near[np.lexsort((-agrees.mean(axis=1), grown, ~has_end))[0]]]
 
 

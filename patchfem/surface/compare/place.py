@@ -21,11 +21,6 @@ TRIED_TURNS = {
 MAX_IMAGE_SIDE_POINTS = {1: 4000, 2: 96}
 # Side of an image relative to the standard deviation of the Gaussian of its long waves, by number of axes
 SIDE_OVER_IMAGE_GAUSSIAN = {1: 40, 2: 12}
-# Fraction of a trace, half of it at each end, over which its heights fall to zero before its spectrum is whitened
-TAPERED_TRACE_FRACTION = 0.1
-MIN_IMAGE_OVERLAP_FRACTION = 0.33  # smallest common part relative to the smaller image
-# Significance of a place beyond which no mirrored scan is tried.
-UNMIRRORED_PLACE_SIGNIFICANCE = 9.0
 
 
 class Place(NamedTuple):
@@ -108,7 +103,8 @@ def find_place(first: Raster, second: Raster) -> Place:
             place = other.origin + pixel * (center + matrix @ (at - center))
             best = Place(place - sampled.middle, float(turn), mirrored, float(significance[peak]))
         # Mirrored scans are tried only if this side does not fit clearly. Traces are always tried both ways.
-        if best.significance > UNMIRRORED_PLACE_SIGNIFICANCE and n_axes > 1:
+        # Significance of a place beyond which no mirrored scan is tried.
+        if best.significance > 9.0 and n_axes > 1:
             break
     return best
 
@@ -140,7 +136,9 @@ def _whiten(z) -> np.ndarray:
     if z.ndim == 1:
         # Tukey's window falls to zero as half a period of a cosine at each end.
         from_end = np.minimum(np.arange(z.size), np.arange(z.size)[::-1]) / (z.size - 1)
-        z = z * np.sin(np.pi * np.minimum(from_end / TAPERED_TRACE_FRACTION, 0.5)) ** 2
+        # Fraction of a trace, half of it at each end, over which its heights fall to zero before
+        # its spectrum is whitened
+        z = z * np.sin(np.pi * np.minimum(from_end / 0.1, 0.5)) ** 2
     spectrum = fft.rfftn(z)
     size = np.abs(spectrum)
     return fft.irfftn(spectrum / (size + np.median(size) + MIN_DIVISOR), z.shape)
@@ -162,7 +160,8 @@ def correlate(first, second) -> np.ndarray:
     norm = np.sqrt(np.maximum(power1 * power2, 1e-12 * power1.max() * power2.max()))
     fisher = np.arctanh(np.clip(product / (norm + MIN_DIVISOR), -0.9999, 0.9999))
     fisher *= np.sqrt(np.maximum(count, 0.0))
-    usable = count > MIN_IMAGE_OVERLAP_FRACTION * min(first.size, second.size)
+    # Smallest common part relative to the smaller image
+    usable = count > 0.33 * min(first.size, second.size)
     known = fisher[usable]
     scatter = max(robust_deviation(known - np.median(known)), 1e-12)
     return np.where(usable, fisher / scatter, -np.inf)

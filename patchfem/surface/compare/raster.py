@@ -11,7 +11,6 @@ from ..profile import MAX_TRACE_SAMPLES, Profile, remove_spikes
 
 MIN_TRACE_HEIGHTS = 40  # smallest number of heights of a trace that is compared
 MIN_SCAN_SIDE = 16  # smallest number of points along each side of a scan
-MAX_GAP_STEPS = 2.5  # distance of two samples, in median steps, above which heights are missing
 # Largest distance from even places, in steps, of a trace that is not resampled
 MAX_SAMPLE_UNEVENNESS = 0.1
 
@@ -120,7 +119,6 @@ def make_raster(surface: Profile | Areal) -> Raster:
     # Points within a wide gap of the trace are missing, unless they are next to a measured height.
     after = np.clip(np.searchsorted(x, grid), 1, x.size - 1)
     nearest = np.minimum(np.abs(grid - x[after - 1]), np.abs(x[after] - grid))
-    is_missing = (distances[after - 1] > MAX_GAP_STEPS * median) & (
-        nearest > MAX_SAMPLE_UNEVENNESS * step
-    )
+    # Distance of two samples, in median steps, above which heights are missing
+    is_missing = (distances[after - 1] > 2.5 * median) & (nearest > MAX_SAMPLE_UNEVENNESS * step)
     return Raster(np.where(is_missing, np.nan, z), x[:1], np.array([step]))

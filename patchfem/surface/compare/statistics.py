@@ -7,10 +7,6 @@ from scipy import fft, ndimage, special
 
 from ..profile import robust_deviation
 
-BIWEIGHT_CONSTANT = 4.685  # tuning constant of Tukey's biweight, 95 % efficient for normal noise
-# Fraction of the values in the shortest interval, whose mean is the mode
-MODE_INTERVAL_FRACTION = 0.3
-MIN_DEPTHS_ON_ONE_SIDE = 20  # smallest number of depths on one side of zero that shows their scale
 # Fraction of unworn surfaces in which noise alone is reported as wear.
 FALSE_POSITIVE_RATE = 1e-3
 # Mean square of normal values of variance one that lie within UNWORN_LIMIT_DEVIATIONS.
@@ -18,10 +14,6 @@ UNWORN_VARIANCE_RATIO = 0.911
 MIN_DIVISOR = 1e-300  # keeps divisions by zero noise finite
 # Side of a surface relative to the deviation of the Gaussian of its long waves
 SIDE_OVER_LONG_WAVE_GAUSSIAN = 40
-# Smallest weight of the neighbours in the mask that determines the level beside a height
-MIN_NEIGHBOUR_WEIGHT = 0.2
-# Short waves relative to the noise, below which no place can be found
-MIN_FINISH_TO_NOISE_RATIO = 1.5
 
 
 def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
@@ -41,7 +33,8 @@ def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
         the sizes of normal values of variance one.
     """
     halves = (depth[depth > 0], depth[depth < 0])
-    sides = [np.abs(side) for side in halves if side.size >= MIN_DEPTHS_ON_ONE_SIDE]
+    # Smallest number of depths on one side of zero that shows their scale
+    sides = [np.abs(side) for side in halves if side.size >= 20]
     if not sides:
         return max(robust_deviation(depth), MIN_DIVISOR) if depth.size else MIN_DIVISOR
     smallest = min(float(np.quantile(side, fraction)) for side in sides)
@@ -64,7 +57,8 @@ def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndar
     excluded : (n,) bool array, optional
         Depths without weight.
     """
-    root = np.clip(1 - (depth / (BIWEIGHT_CONSTANT * sigma)) ** 2, 0.0, None)
+    # Tuning constant of Tukey's biweight, 95 % efficient for normal noise
+    root = np.clip(1 - (depth / (4.685 * sigma)) ** 2, 0.0, None)
     if excluded is not None:
         root = np.where(excluded, 0.0, root)
     scale = np.sqrt((jacobian**2).mean(axis=0)) + MIN_DIVISOR
@@ -80,7 +74,8 @@ def make_polynomials(count: int, degree: int) -> np.ndarray:
 def find_mode(values) -> float:
     """Return the mode of values: the mean of the shortest interval that contains 30 % of them."""
     ordered = np.sort(values)
-    count = max(int(MODE_INTERVAL_FRACTION * ordered.size), 2)
+    # Fraction of the values in the shortest interval, whose mean is the mode
+    count = max(int(0.3 * ordered.size), 2)
     if ordered.size <= count:
         return float(ordered.mean())
     start = int(np.argmin(ordered[count - 1 :] - ordered[: ordered.size - count + 1]))
@@ -137,7 +132,8 @@ def subtract_local_level(values, mask) -> np.ndarray:
     deviations = np.array(values.shape) / SIDE_OVER_LONG_WAVE_GAUSSIAN
     weight = smooth(mask.astype(float), deviations)
     level = smooth(np.where(mask, values, 0.0), deviations) / np.maximum(weight, MIN_DIVISOR)
-    return np.where(weight > MIN_NEIGHBOUR_WEIGHT, values - level, np.nan)
+    # Smallest weight of the neighbours in the mask that determines the level beside a height
+    return np.where(weight > 0.2, values - level, np.nan)
 
 
 def find_mirror_finish(surfaces) -> dict[str, float]:
@@ -148,7 +144,8 @@ def find_mirror_finish(surfaces) -> dict[str, float]:
     for z in surfaces:
         noise = robust_deviation(np.diff(z, 2)) / np.sqrt(6)
         height = robust_deviation(remove_long_waves(z))
-        if height <= MIN_FINISH_TO_NOISE_RATIO * noise:
+        # Short waves relative to the noise, below which no place can be found
+        if height <= 1.5 * noise:
             return {"rq": float(height), "noise": float(noise)}
     return {}
 

@@ -12,16 +12,12 @@ from .statistics import compute_threshold, remove_long_waves
 
 # Ratio of worn tops to filled valleys, or of lost to grown material, above which it is wear. Its reverse shows growth.
 LOSS_TO_GROWTH_RATIO = 3.0
-MIN_WORN_TOPS = 3  # smallest number of worn tops that are no specks of dust on the first surface
-MIN_WORN_TOP_SIDE = 2  # smallest side of a worn top, in samples; a spike is narrower
 N_HEIGHT_CLASSES = 10  # number of classes of heights whose depths are compared
 N_VALLEY_CLASSES = 3  # number of the lowest classes, which wear last
 N_TOP_CLASSES = 6  # number of the highest classes
 # Smallest rise of the median depth from valleys to tops, in standard deviations of a depth, and of a median.
 MIN_DEPTH_RISE_DEVIATIONS = 0.2
 MIN_RISE_IN_MEDIAN_DEVIATIONS = 3.5
-MIN_TOP_HEIGHT_QUANTILE = 0.25  # quantile of the worn heights above which a height is a top
-SAMPLES_PER_TOP = 3  # number of samples whose mean depth shows whether a top is worn
 
 
 def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
@@ -50,10 +46,12 @@ def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
 
     # Single tops and valleys whose depth is beyond the largest one that noise alone reaches. The opening removes spikes.
     limit = compute_threshold(len(WINDOW_SIDES[height.ndim]) * height.size)
-    square = np.ones((MIN_WORN_TOP_SIDE,) * height.ndim)
+    # Smallest side of a worn top, in samples; a spike is narrower
+    square = np.ones((2,) * height.ndim)
     worn = ndimage.binary_opening((relative > limit) & is_high, square)
     filled = ndimage.binary_opening((relative < -limit) & ~is_high, square)
-    if ndimage.label(worn)[1] < max(MIN_WORN_TOPS, LOSS_TO_GROWTH_RATIO * ndimage.label(filled)[1]):
+    # Smallest number of worn tops that are no specks of dust on the first surface
+    if ndimage.label(worn)[1] < max(3, LOSS_TO_GROWTH_RATIO * ndimage.label(filled)[1]):
         worn[:] = False
 
     # Slight wear of all tops shows in the medians of classes of heights.
@@ -124,9 +122,11 @@ def find_tops(depths: DepthMap) -> Tops:
     is_deep = depths.worn & (relative > UNWORN_LIMIT_DEVIATIONS)
     if not is_deep.any():
         return Tops(np.zeros(0, int), np.zeros(0), is_deep)
-    is_high = height > np.quantile(height[is_deep], MIN_TOP_HEIGHT_QUANTILE)
+    # Quantile of the worn heights above which a height is a top
+    is_high = height > np.quantile(height[is_deep], 0.25)
     runs = find_runs(is_high)
     tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
     tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
     # A top is a few samples wide, whose noise is partly independent.
-    return Tops(tops, ndimage.uniform_filter1d(relative, SAMPLES_PER_TOP)[tops], is_high)
+    # Number of samples whose mean depth shows whether a top is worn
+    return Tops(tops, ndimage.uniform_filter1d(relative, 3)[tops], is_high)

@@ -13,43 +13,22 @@ from .depth_map import UNWORN_LIMIT_DEVIATIONS, DepthMap
 from .records import Track, name_estimate, name_quantity, name_unknown
 from .tops import find_tops
 
-MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
 # Number of unworn tops that separate two tracks, and to which the interval of an end reaches; the floor may spare one.
 MIN_UNWORN_TOPS = 2
-# Mean depth of the tops of a part of a trace, in standard deviations of a depth, from which on it belongs to a track
-MIN_TRACK_DEPTH_DEVIATIONS = 0.5
 # Largest mean depth over the few samples of a top that is not worn, in standard deviations of a single depth
 MAX_UNWORN_TOP_DEVIATIONS = 1.5
-# Mean depth of valleys relative to that of tops below which only the tops of a part are worn
-MAX_VALLEY_TO_TOP_DEPTH = 0.5
-# Fraction of changed heights in a wider gap that belongs to the track
-MIN_CHANGED_GAP_FRACTION = 0.85
-# Standard deviations of a single height on a flank.
-MIN_FLANK_DEPTH_DEVIATIONS = 4.0
 # Length of the flanks beyond the known ends of a track, relative to its width
 FLANK_OVER_TRACK_WIDTH = 0.1
 # Number of samples between a track and the end of the section that cuts it off
 MAX_SAMPLES_TO_CUT_END = 5
 # Powers of the distance from the end in the forms of a flank: cliff, cliff with a slope, wedge, round.
 FLANK_POWERS = ((0,), (0, 1), (1,), (2,), (1, 2), (2, 3))
-CLEAR_FLANK_DEVIANCE = 12.0  # lead of a form of flank that excludes another one
 FITTED_FLANK_DEVIATIONS = 25.0  # depth, in standard deviations, to which a flank is fitted
 MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the surface beside it
 # Largest number of samples in which a flank reaches FITTED_FLANK_DEVIATIONS
 MAX_FLANK_SAMPLES = 400
-SHALLOW_FLANK_SAMPLES = 60  # number of samples of a flank that stays below FITTED_FLANK_DEVIATIONS
-MAX_TRIED_ENDS = 80  # number of positions that are tried as an end of a worn track
-# Number of samples beyond the likely places that belong to the interval of an end
-END_INTERVAL_MARGIN_SAMPLES = 2
 # Squared residual of a single depth beyond which it counts no more
 MAX_SQUARED_DEPTH_RESIDUAL = 16.0
-# Length of the low outer flank of a ridge relative to what is found as grown
-RIDGE_TAIL_OVER_FOUND_LENGTH = 0.5
-# The floor of a track is its deepest part of the length of a fifth of it
-TRACK_OVER_FLOOR_LENGTH = 5
-# Bias of the largest of the means over parts of a length, in standard deviations of such a mean, for each length over
-# which they are within two of these of the largest; 0.5 to 0.9 for flat, round, wedge-shaped and tilted bottoms.
-BIAS_OF_LARGEST_MEAN = 0.7
 
 
 class End(NamedTuple):
@@ -89,11 +68,15 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
         (first, stop), (start, last) = spans[k : k + 2]
         gap = start - stop
         width = max(stop - first, last - start)
-        is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_GAP_FRACTION
+        # Fraction of changed heights in a wider gap that belongs to the track
+        is_changed = gap <= width and changed[stop : start + 1].mean() > 0.85
         between = tops.depths[slice(*np.searchsorted(tops.places, (stop, start)))]
         n_unworn = (between < MAX_UNWORN_TOP_DEVIATIONS).sum()
-        has_tops = n_unworn >= MIN_UNWORN_TOPS and between.mean() < MIN_TRACK_DEPTH_DEVIATIONS
-        if not has_tops or gap <= MAX_GAP_FRACTION * width or is_changed:
+        # Mean depth of the tops of a part of a trace, in standard deviations of a depth, from which
+        # on it belongs to a track
+        has_tops = n_unworn >= MIN_UNWORN_TOPS and between.mean() < 0.5
+        # Largest unworn gap in a track relative to its width
+        if not has_tops or gap <= 0.05 * width or is_changed:
             # A wider track may bridge the gap before it too.
             spans[k : k + 2] = [(first, last)]
             k = max(k - 1, 0)
@@ -164,7 +147,8 @@ def _has_unworn_valleys(relative, is_high) -> bool:
     """
     if is_high.all() or not is_high.any():
         return False
-    return bool(relative[~is_high].mean() < MAX_VALLEY_TO_TOP_DEPTH * relative[is_high].mean())
+    # Mean depth of valleys relative to that of tops below which only the tops of a part are worn
+    return bool(relative[~is_high].mean() < 0.5 * relative[is_high].mean())
 
 
 def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
@@ -189,8 +173,10 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     # Above half of its depth, the floor of a shallow track begins.
     inner = relative[worn : worn + MAX_FLANK_SAMPLES]
     height = min(FITTED_FLANK_DEVIATIONS, np.quantile(inner, 0.9) / 2)
-    deep = np.flatnonzero(inner > max(height, MIN_FLANK_DEPTH_DEVIATIONS))
-    length = int(deep[0]) + 3 if deep.size else SHALLOW_FLANK_SAMPLES
+    # Standard deviations of a single height on a flank.
+    deep = np.flatnonzero(inner > max(height, 4.0))
+    # Number of samples of a flank that stays below FITTED_FLANK_DEVIATIONS
+    length = int(deep[0]) + 3 if deep.size else 60
     stop = min(worn + length, x.size)
     low = max(worn - max(length, MIN_FLANK_SAMPLES), 0)
 
@@ -202,7 +188,8 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
 
     # The level of the unworn heights is uncertain, so the change point is sought for three levels.
     level = HALF_WIDTH_95 * depths.level_error / depths.noise_level
-    stride = max(part.size // MAX_TRIED_ENDS, 1)
+    # Number of positions that are tried as an end of a worn track
+    stride = max(part.size // 80, 1)
     # A flank begins between two samples.
     places = part[2:-1:stride] - step / 2
     levels = np.array([values, values + level, values - level])
@@ -212,10 +199,12 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     # of the end reaches over all of them.
     lowest = deviance.min(axis=2, keepdims=True)
     is_likely = deviance < lowest + HALF_WIDTH_95**2
-    is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_FLANK_DEVIANCE
+    # Lead of a form of flank that excludes another one
+    is_likely &= lowest < lowest.min(axis=1, keepdims=True) + 12.0
     ends = np.flatnonzero(is_likely.any(axis=(0, 1)))
     best = int(np.argmin(deviance[0].min(axis=0)))
-    margin = END_INTERVAL_MARGIN_SAMPLES * stride * step
+    # Number of samples beyond the likely places that belong to the interval of an end
+    margin = 2 * stride * step
     return End(
         float(places[best]), float(places[ends[0]] - margin), float(places[ends[-1]] + margin)
     )
@@ -332,7 +321,8 @@ def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
     `width` [m].
     """
     inside = np.flatnonzero((depths.x >= start) & (depths.x <= start + width))
-    count = max(inside.size // TRACK_OVER_FLOOR_LENGTH, 1)
+    # The floor of a track is its deepest part of the length of a fifth of it
+    count = max(inside.size // 5, 1)
     means = np.convolve(depths.depth[inside], np.ones(count) / count, "valid")
     best = int(np.argmax(means))
 
@@ -340,7 +330,10 @@ def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
     length = count + depths.errors.correlation
     sigma = float(np.median(depths.noise[inside])) * np.sqrt(depths.errors.correlation / length)
     n_lengths = ((means > means[best] - 2 * sigma).sum() - 1) / length
-    bias = BIAS_OF_LARGEST_MEAN * sigma * n_lengths
+    # Bias of the largest of the means over parts of a length, in standard deviations of such a
+    # mean, for each length over which they are within two of these of the largest; 0.5 to 0.9 for
+    # flat, round, wedge-shaped and tilted bottoms.
+    bias = 0.7 * sigma * n_lengths
 
     part = np.zeros(depths.x.size, bool)
     part[inside[best : best + count]] = True
@@ -369,7 +362,8 @@ def _measure_pile_up(depths: DepthMap, ends: tuple[End, End], width: float) -> t
             )
             variance += (error + max(area, 0.0) / HALF_WIDTH_95) ** 2
             continue
-        tail = max(float(grown.min()), RIDGE_TAIL_OVER_FOUND_LENGTH * float(np.ptp(grown)))
+        # Length of the low outer flank of a ridge relative to what is found as grown
+        tail = max(float(grown.min()), 0.5 * float(np.ptp(grown)))
         inside = is_beside & (distance <= grown.max() + tail)
         # A ridge may begin anywhere in the interval of the end.
         is_end = (depths.x >= end.low) & (depths.x <= end.high) & (depths.depth < 0)

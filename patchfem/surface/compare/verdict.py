@@ -8,10 +8,6 @@ from .depth_map import DepthMap
 from .statistics import FALSE_POSITIVE_RATE, subtract_local_level
 from .tops import LOSS_TO_GROWTH_RATIO, find_worn_tops
 
-MIN_GROWN_DEVIATIONS = 5.0  # standard deviations of grown material that is reported
-# Standard deviations of lost material that is reported beside as much growth
-MIN_LOST_DEVIATIONS = 4.0
-
 
 def find_sure_loss(depths: DepthMap) -> float:
     """Return how many standard deviations a loss must have so that neither drift nor noise explains it.
@@ -71,9 +67,11 @@ def judge_change(
     """
     if area > HALF_WIDTH_95 * error and lost > LOSS_TO_GROWTH_RATIO * grown:
         return "worn" if area > sure_loss * error else "scar_or_drift"
-    is_grown = grown > MIN_GROWN_DEVIATIONS * grown_error
+    # Standard deviations of grown material that is reported
+    is_grown = grown > 5.0 * grown_error
     if is_grown and grown > LOSS_TO_GROWTH_RATIO * max(lost, 0.0):
         return "grown"
-    if is_grown and lost > MIN_LOST_DEVIATIONS * error:
+    # Standard deviations of lost material that is reported beside as much growth
+    if is_grown and lost > 4.0 * error:
         return "worn_and_grown"
     return "no_wear"

@@ -19,15 +19,11 @@ MAX_RATIO_BLOCKS = 12  # largest number of blocks whose ratios show the scatter 
 MIN_RATIO_BLOCKS = 4  # smallest number of blocks
 # Smallest length of a block in the longest wave; shorter blocks are correlated
 MIN_BLOCK_WAVES = 2.0
-# Deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off.
-CUTOFF_TO_DEVIATION = 0.187
-# Standard deviation of a ratio due to tip, interpolation and datum
-RATIO_RELATIVE_DEVIATION = 0.004
-# Largest mean square of the noise, relative to that of a surface, at which the ratio after/before of the surfaces is known
-MAX_NOISE_OVER_SIZE = 0.5
 # Smallest length of a trace relative to the longest wave of the band
 MIN_TRACE_WAVES = 3.0
 MIN_STEPS_PER_WAVE = 4.0  # smallest length of the shortest wave of the band in steps
+# Shortest wave of the slope in steps. Interpolation between samples changes the slope of longer ones by less than 1 %.
+SHORTEST_SLOPE_WAVE_STEPS = 8.0
 RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
 # Power of the mean over sections that gives a size of the roughness.
 SECTION_MEAN_POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
@@ -40,9 +36,10 @@ def compare_waves(
 ) -> dict[str, Quantity]:
     """Compute the ratios of amplitude and slope, after divided by before, with their intervals.
 
-    Each line is levelled. The band is cut out by two Gaussian filters, and longer waves have no part in the slope. The
-    ends of tracks, whose flanks have all waves, do not count. The interval of the
-    logarithm follows from the scatter of the ratios of blocks, which aligned surfaces share.
+    Each line is levelled. The band is cut out by two Gaussian filters, and longer waves have no part in the slope. Waves
+    shorter than 8 steps have none either, because one of the surfaces is interpolated between its samples. The noise of
+    the slope is subtracted. The ends of tracks, whose flanks have all waves, do not count. The interval of the logarithm
+    follows from the scatter of the ratios of blocks, which aligned surfaces share.
 
     Parameters
     ----------
@@ -69,23 +66,28 @@ def compare_waves(
 
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
     lines = [_subtract_polynomial(line, 1) for line in lines]
-    deviations = [(0.0, CUTOFF_TO_DEVIATION * wave / step) for wave in WAVE_BAND]
+    waves = (*WAVE_BAND, SHORTEST_SLOPE_WAVE_STEPS * step)
+    # The deviation of the Gaussian filter of ISO 16610-21 is .187 of its cut-off.
+    deviations = [(0.0, 0.187 * wave / step) for wave in waves]
     lines = [z - smooth(z, deviations[1]) for z in lines]
     passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, is_kept] for z in lines]
-    slopes = [(np.diff(z, axis=1) / step)[:, is_kept[1:]] for z in lines]
+    slopes = [(np.diff(smooth(z, deviations[2]), axis=1) / step)[:, is_kept[1:]] for z in lines]
 
-    # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
-    band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / WAVE_BAND[0] - 1 / WAVE_BAND[1]))
+    # White noise of each surface in the band of the amplitude, and behind the filter of the slope.
+    white = noise / np.sqrt(2)
+    band_noise = white * np.sqrt(2 * step * (1 / WAVE_BAND[0] - 1 / WAVE_BAND[1]))
+    slope_noise = white / step * np.sqrt(1 / (4 * np.sqrt(np.pi) * deviations[2][1] ** 3))
     n_blocks = int(
         np.clip(length / (MIN_BLOCK_WAVES * WAVE_BAND[1]), MIN_RATIO_BLOCKS, MAX_RATIO_BLOCKS)
     )
     values = {}
-    errors = (band_noise, noise / step)
+    errors = (band_noise, slope_noise)
     for name, sizes, error in zip(RATIO_NAMES, (passed, slopes), errors):
         blocks = [_average_squares(np.array_split(size, n_blocks, 1)) for size in sizes]
         if _is_noise(error, blocks):
             values[name] = name_unknown(name, "noise")
             continue
+        blocks = [block - error**2 for block in blocks]
         values[name] = name_quantity(name, *_divide_means(*blocks, 0.5))
     return values
 
@@ -111,7 +113,9 @@ def _is_noise(error: float, squares: Sequence[np.ndarray]) -> bool:
     the sizes before and after wear.
     """
     smallest = min(block.mean() for block in squares)
-    return not smallest > 0 or error**2 > MAX_NOISE_OVER_SIZE * smallest
+    # Largest mean square of the noise, relative to that of a surface, at which the ratio
+    # after/before of the surfaces is known
+    return not smallest > 0 or error**2 > 0.5 * smallest
 
 
 def _divide_means(before, after, power: float) -> np.ndarray:
@@ -126,7 +130,8 @@ def _divide_means(before, after, power: float) -> np.ndarray:
     influence = after / second - before / first
     scatter = power * influence.std(ddof=1) / np.sqrt(len(before))
     student = float(special.stdtrit(len(before) - 1, 0.975))
-    width = student * float(np.hypot(scatter, RATIO_RELATIVE_DEVIATION))
+    # Standard deviation of a ratio due to tip, interpolation and datum
+    width = student * float(np.hypot(scatter, 0.004))
     return (second / first) ** power * np.exp([0.0, -width, width])
 
 

@@ -14,11 +14,6 @@ from .content import DAMAGED_FILE_REMEDY, Content
 from .table import Table
 from .units import HEADER_EXAMPLE
 
-# Smallest number of rows of a matrix in a .mat file that may be a table of columns
-MIN_TABLE_ROWS = 8
-# Names of an array of heights in a MATLAB file, the first one that it has is read
-HEIGHT_ARRAY_NAMES = ("z", "gap", "height", "heights")
-
 
 def read_npy(content: Content) -> Table:
     """Read the content of an .npy file of two or three columns, or of as many rows."""
@@ -38,9 +33,11 @@ def read_mat(content: Content) -> Table:
     path = content.path
     arrays = matlab.read_real_arrays(path, content.data)
     by_name = {name.lower(): array for name, array in arrays.items()}
-    height = next((name for name in HEIGHT_ARRAY_NAMES if name in by_name), None)
+    # Names of an array of heights in a MATLAB file, the first one that it has is read
+    height = next((name for name in ("z", "gap", "height", "heights") if name in by_name), None)
     if not height or "x" not in by_name:
-        tables = {name: array for name, array in arrays.items() if len(array) >= MIN_TABLE_ROWS}
+        # Smallest number of rows of a matrix in a .mat file that may be a table of columns
+        tables = {name: array for name, array in arrays.items() if len(array) >= 8}
         return _read_columns(path, tables)
 
     columns = {name: by_name[name].ravel() for name in "xy" if name in by_name}

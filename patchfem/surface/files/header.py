@@ -14,12 +14,8 @@ from ...core import PatchfemError
 from ...inputs.tables import NUMBER_PATTERN
 from .units import COORDINATES_BY_COLUMN_NAME, HEADER_EXAMPLE, parse_length_unit
 
-# Largest number of characters of a line in which names of columns are sought
-MAX_COLUMN_LINE_CHARACTERS = 1000
-MAX_HEADER_LINES = 500  # largest number of lines in a header; instruments write fewer than 200
 # Largest number of characters in the name of a column with its unit
 MAX_COLUMN_NAME_CHARACTERS = 80
-MAX_TRACE_TABLE_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers
 # Signs at the start of a line of the header that is a comment
 COMMENT_SIGNS = ("#", "%", "//")
 # Pattern of a number with a decimal comma, such as -1,25e-6
@@ -92,7 +88,8 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
     named: dict[int, tuple[int, list[Column]]] = {}  # lines of names by their number of cells
     facts = {}
     number = 0
-    for number, line in islice(lines, MAX_HEADER_LINES):
+    # Largest number of lines in a header; instruments write fewer than 200
+    for number, line in islice(lines, 500):
         is_comment = line.lstrip().startswith(COMMENT_SIGNS)
         text = line.strip(" \n\t#%/") if is_comment else line.strip()
         cells, delimiter = split_cells(text)
@@ -110,7 +107,8 @@ def read_header(path, lines: Iterator[tuple[int, str]]) -> tuple[Header, Iterato
         parsed = [_parse_column(cell) for cell in cells]
         if any(column.coordinate for column in parsed):
             is_other = any(re.search("[:=]", column.name) for column in parsed)
-            if not 1 < len(parsed) <= MAX_TRACE_TABLE_COLUMNS or is_other:
+            # Largest number of columns: x, y, z, and one with row numbers
+            if not 1 < len(parsed) <= 4 or is_other:
                 continue
             start = number
             columns = parsed
@@ -169,7 +167,8 @@ def split_cells(text: str) -> tuple[list[str], str | None]:
         if len(cells) > 1 and all(is_number(cell, delimiter) for cell in cells):
             return cells, delimiter
     delimiter = next((sign for sign in delimiters[:-1] if sign in text), None)
-    line = text[:MAX_COLUMN_LINE_CHARACTERS]
+    # Largest number of characters of a line in which names of columns are sought
+    line = text[:1000]
     cells = text.split(delimiter) if delimiter else _CELL_PATTERN.findall(line)
     return _strip_cells(cells), delimiter
 

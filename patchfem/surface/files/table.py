@@ -18,21 +18,10 @@ from .units import (
 
 MAX_HEIGHTS = 50_000_000  # largest number of heights
 MAX_COORDINATE = 10.0  # length or coordinate [m] above which a number has a wrong unit
-MIN_TRACE_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
 # Fraction of the highest, and of the lowest, heights that may be faults, such as 999 um for no signal.
 MAX_FAULTY_HEIGHT_FRACTION = 0.01
-# Smallest number of positions that show whether they are even but for rounding
-MIN_ROUNDED_POSITIONS = 10
-# Largest distance from even positions in printed digits, half of which is rounding.
-MAX_ROUNDING_IN_DIGITS = 0.75
-MIN_PRINTED_DIGIT = 1e-11  # smallest printed digit of a position [m]
-# Largest distance of a step from a multiple of the printed digit, relative to the digit
-STEP_DIGIT_TOL = 1e-4
 # Largest distance of positions that count as even, and smallest difference of two steps, relative to a step.
 EVEN_POSITIONS_TOL = 1e-6
-# Largest distance of positions that count as equal, relative to the length of the axis.
-POSITION_ROUND_OFF = 1e-9
-MAX_CELLS_PER_POINT = 4  # largest number of raster cells per point; scattered points need more
 
 
 class Table(NamedTuple):
@@ -190,7 +179,8 @@ def _fill_raster(table: Table) -> Table:
 
     # Scattered points would leave nearly all cells of a grid empty.
     count = rows.size * columns.size
-    if count > max(MAX_CELLS_PER_POINT * z.size, 16) or count > MAX_HEIGHTS:
+    # Largest number of raster cells per point; scattered points need more
+    if count > max(4 * z.size, 16) or count > MAX_HEIGHTS:
         raise PatchfemError(
             f"{table.path}: {z.size} points with {columns.size} different x and {rows.size} different y do "
             "not fill a grid; export the scan as a grid, or one trace of two columns"
@@ -214,7 +204,8 @@ def _find_positions(values) -> tuple[np.ndarray, np.ndarray]:
     Values that differ by round-off count as equal.
     """
     positions, index = np.unique(values, return_inverse=True)
-    is_new = np.diff(positions, prepend=-np.inf) > POSITION_ROUND_OFF * np.ptp(values)
+    # Largest distance of positions that count as equal, relative to the length of the axis.
+    is_new = np.diff(positions, prepend=-np.inf) > 1e-9 * np.ptp(values)
     return positions[is_new], (np.cumsum(is_new) - 1)[index]
 
 
@@ -251,17 +242,20 @@ def _undo_rounding(table: Table, coordinate: str, x) -> tuple[Table, np.ndarray]
 
     `coordinate` is "x" or "y". The table gets a note if positions are changed.
     """
-    if x.size < MIN_ROUNDED_POSITIONS:
+    # Smallest number of positions that show whether they are even but for rounding
+    if x.size < 10:
         return table, x
 
     # The printed digit is the smallest difference of two steps.
     gaps = np.diff(np.sort(np.diff(x)))
     gaps = gaps[gaps > EVEN_POSITIONS_TOL * np.ptp(x) / x.size]
-    digit = MIN_PRINTED_DIGIT
+    # Smallest printed digit of a position [m]
+    digit = 1e-11
     if gaps.size and gaps[0] > digit:
         digit = float(gaps[0])
         n_digits = np.diff(x) / digit
-        if max_abs(n_digits - np.rint(n_digits)) > STEP_DIGIT_TOL:
+        # Largest distance of a step from a multiple of the printed digit, relative to the digit
+        if max_abs(n_digits - np.rint(n_digits)) > 1e-4:
             return table, x
 
     # Candidates for even positions: by the length in the header over n or n - 1 steps, and by regression
@@ -275,7 +269,8 @@ def _undo_rounding(table: Table, coordinate: str, x) -> tuple[Table, np.ndarray]
     for even in evens:
         distance = max_abs(x - even)
         step = float(even[1] - even[0])
-        if step > 0 and distance <= MAX_ROUNDING_IN_DIGITS * digit:
+        # Largest distance from even positions in printed digits, half of which is rounding.
+        if step > 0 and distance <= 0.75 * digit:
             if distance <= EVEN_POSITIONS_TOL * step:
                 return table, x
             note = (
@@ -294,7 +289,8 @@ def _check_span(path, length: float, z, *, has_sure_units: bool) -> tuple[str, .
     `path` names the file in messages, z (n,) or (m, n) are its heights, and `has_sure_units` tells whether the units
     were given by the user or by the format.
     """
-    if length < MIN_TRACE_LENGTH:
+    # Length [m] below which a trace has a wrong unit
+    if length < 1e-9:
         raise PatchfemError(
             f"{path}: the profile is {format_length(length, 3)} long; is the unit of x right?"
         )

@@ -9,10 +9,7 @@ from ..quantity import read_definitions
 from .parameters import compute_core, compute_moments
 
 AUTOCORRELATION_AT_SAL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 25178-3)
-# Smallest autocorrelation length in raster steps; the raster does not resolve a shorter one.
-MIN_AUTOCORRELATION_STEPS = 2.0
 N_AUTOCORRELATION_DIRECTIONS = 360  # number of directions in which the autocorrelation is followed
-RAY_POINTS_PER_STEP = 4  # number of points on a ray per raster step
 # Unit and definition of each parameter of a scan, by name
 AREAL_DEFINITIONS = read_definitions("areal")
 
@@ -51,7 +48,8 @@ def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float |
     if values["Sq"] > 0:
         distances = _find_decay_lengths(autocorrelation(z), steps)
     shortest = float(distances.min())
-    if shortest < MIN_AUTOCORRELATION_STEPS * max(steps):
+    # Smallest autocorrelation length in raster steps; the raster does not resolve a shorter one.
+    if shortest < 2.0 * max(steps):
         values |= {"Sal": "unresolved", "Str": "unresolved"}
     elif np.isfinite(shortest):
         values["Sal"] = shortest
@@ -103,7 +101,8 @@ def _find_decay_lengths(rho, steps: tuple[float, float]) -> np.ndarray:
     from scipy import ndimage
 
     sizes = (np.array(rho.shape) // 2) * steps
-    radius = np.arange(0.0, float(np.hypot(*sizes)), min(steps) / RAY_POINTS_PER_STEP)
+    # Number of points on a ray per raster step
+    radius = np.arange(0.0, float(np.hypot(*sizes)), min(steps) / 4)
     angle = np.linspace(0.0, np.pi, N_AUTOCORRELATION_DIRECTIONS, endpoint=False)
     rays = np.array([np.sin(angle), np.cos(angle)])[..., None] * radius
     pixels = rays / np.reshape(steps, (2, 1, 1)) + np.reshape(rho.shape, (2, 1, 1)) // 2

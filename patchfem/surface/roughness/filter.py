@@ -13,8 +13,6 @@ from ..profile import Profile, measure_step, resample_evenly
 
 # Width of the weights relative to the cut-off; a wave of the cut-off keeps half its height.
 WIDTH_OVER_CUTOFF = np.sqrt(np.log(2) / np.pi)
-# Half-length of the weights relative to the cut-off; 1.5e-10 of their sum lies beyond.
-WEIGHTS_REACH_OVER_CUTOFF = 1.25
 MIN_CUTOFF_STEPS = 4  # smallest cut-off in steps; the samples do not resolve a shorter one
 
 
@@ -108,6 +106,7 @@ def _convolve(z, weight) -> np.ndarray:
 
 def _gaussian_weights(cutoff: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return offsets and Gaussian weights for a `cutoff` in steps, over `count` samples at most."""
-    half = min(int(np.ceil(WEIGHTS_REACH_OVER_CUTOFF * cutoff)), count - 1)
+    # Half-length of the weights relative to the cut-off; 1.5e-10 of their sum lies beyond.
+    half = min(int(np.ceil(1.25 * cutoff)), count - 1)
     offsets = np.arange(-half, half + 1.0)
     return offsets, np.exp(-np.pi * (offsets / (WIDTH_OVER_CUTOFF * cutoff)) ** 2)

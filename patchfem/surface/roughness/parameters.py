@@ -19,7 +19,6 @@ MIN_SECTIONS = 5  # smallest number of sections whose scatter gives intervals
 # Parameters without an interval: extremes and high moments of a whole trace depend on single heights, so that the
 # scatter of sections does not show their errors.
 PARAMETERS_WITHOUT_INTERVAL = ("t", "sk", "ku")
-CORE_LENGTH_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
 
 # Unit and definition of each parameter of a trace, by name
 PROFILE_DEFINITIONS = read_definitions("profile")
@@ -113,7 +112,8 @@ def compute_core(z) -> dict[str, float | None]:
         return dict.fromkeys(("k", "pk", "vk", "Mr1", "Mr2"))
 
     # The flattest 40 % of the curve, and the line through it.
-    size = max(round(CORE_LENGTH_FRACTION * n), 2)
+    # Fraction of the length under the secant of the core (ISO 13565-2)
+    size = max(round(0.40 * n), 2)
     start = int(np.argmin(z[: n - size + 1] - z[size - 1 :]))
     part = z[start : start + size]
     ratio = (np.arange(start, start + size) + 0.5) / n

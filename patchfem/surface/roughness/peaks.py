@@ -26,16 +26,8 @@ SUMMIT_VARIANCE_COEFFICIENT = 0.8968
 MIN_SPECTRAL_WIDTH_ALPHA = 1.5
 # Ratio of the decay length u_0 to the rms height by Persson 2007, and by simulation (Pastewka 2013)
 DECAY_LENGTH_OVER_RMS_HEIGHT = (0.4, 0.5)
-# Largest fraction of the samples in spikes; more apparent spikes belong to the surface.
-MAX_SPIKE_SAMPLE_FRACTION = 0.1
 # Largest skewness whose effect on the stiffness is below the uncertainty of the theory.
 MAX_HEIGHT_SKEWNESS = 0.5
-# Largest kurtosis minus 3 whose effect on the stiffness is below the uncertainty of the theory
-MAX_EXCESS_KURTOSIS = 1.0
-# Fraction of the heights that are the sharpest; those of a Gaussian trace have 5 % of m_4.
-SHARPEST_HEIGHT_FRACTION = 0.005
-# Largest fraction of m_4 in the sharpest heights; more may be due to dust
-MAX_SHARPEST_M4_FRACTION = 0.5
 # Standard deviations that skewness and kurtosis of Gaussian traces reach
 MAX_GAUSSIAN_MOMENT_DEVIATIONS = 3
 
@@ -84,7 +76,8 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
     clean = remove_spikes(trace)
     is_removed = clean.missing & ~trace.missing
     dust = ()
-    if is_removed.mean() > MAX_SPIKE_SAMPLE_FRACTION:
+    # Largest fraction of the samples in spikes; more apparent spikes belong to the surface.
+    if is_removed.mean() > 0.1:
         # So many apparent spikes belong to the surface.
         clean = trace
     elif is_removed.any():
@@ -105,8 +98,10 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
 
     # A few heights, such as those of wide dust, may make up most of m_4.
     bend = np.diff(flat.z, 2) ** 2
-    order = np.argsort(bend)[::-1][: max(int(SHARPEST_HEIGHT_FRACTION * bend.size), 1)]
-    if bend[order].sum() > MAX_SHARPEST_M4_FRACTION * bend.sum():
+    # Fraction of the heights that are the sharpest; those of a Gaussian trace have 5 % of m_4.
+    order = np.argsort(bend)[::-1][: max(int(0.005 * bend.size), 1)]
+    # Largest fraction of m_4 in the sharpest heights; more may be due to dust
+    if bend[order].sum() > 0.5 * bend.sum():
         dust += (
             f"{order.size} of {flat.z.size} heights, the sharpest at x = {format_length(flat.x[order[0] + 1])}, make up "
             "most of the mean square curvature, as dust does; if they are dust, write nan for them",
@@ -144,7 +139,8 @@ def _describe_skew(z, moments: Moments, length: float) -> str:
     excess = float(np.mean(unit**4)) - 3
     count = max(moments.slope * length / (np.pi * moments.height), 1.0)
     max_skewness = max(MAX_HEIGHT_SKEWNESS, MAX_GAUSSIAN_MOMENT_DEVIATIONS * np.sqrt(6 / count))
-    max_excess = max(MAX_EXCESS_KURTOSIS, MAX_GAUSSIAN_MOMENT_DEVIATIONS * np.sqrt(24 / count))
+    # Largest kurtosis minus 3 whose effect on the stiffness is below the uncertainty of the theory
+    max_excess = max(1.0, MAX_GAUSSIAN_MOMENT_DEVIATIONS * np.sqrt(24 / count))
     if abs(skewness) <= max_skewness and abs(excess) <= max_excess:
         return ""
     effect = "the stiffness from the theory is only a guess"

@@ -28,10 +28,6 @@ from .parameters import (
 
 # Standard cut-offs [m]: those of ISO 21920-3 and one more at each end.
 STANDARD_CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)
-# Smallest length of a trace in cut-offs: five are evaluated, and the filter trims one in total.
-MIN_TRACE_CUTOFFS = 6
-# Probability of a true value below, and above, the interval of a parameter
-CONFIDENCE_TAIL_PROBABILITY = 0.05
 
 
 class Sampling(NamedTuple):
@@ -185,7 +181,8 @@ def _measure_trace(
     # The interval is that of a mean over sections by Student's t of its logarithm.
     errors = estimate_errors(rough.z, primary.step, cutoff)
     n_sections = rough.z.size // round(cutoff / primary.step)
-    student = special.stdtrit(max(n_sections - 1, 1), 1 - CONFIDENCE_TAIL_PROBABILITY)
+    # Probability of a true value below, and above, the interval of a parameter
+    student = special.stdtrit(max(n_sections - 1, 1), 1 - 0.05)
     for name, value in compute_parameters(rough.z, primary.step, cutoff).items():
         long_name = name if name.startswith("Mr") else f"R{name}"
         quantity = _name_value(long_name, value, *PROFILE_DEFINITIONS[name], "roughness profile")
@@ -239,7 +236,8 @@ def _name_value(name: str, value: float | None, unit: str, text: str, profile: s
 
 def fitting_cutoff(length: float, step: float) -> float | None:
     """Return the longest standard cut-off [m] that a trace of this length and step [m] allows."""
-    longest = length * (1 + 1e-9) / MIN_TRACE_CUTOFFS
+    # Smallest length of a trace in cut-offs: five are evaluated, and the filter trims one in total.
+    longest = length * (1 + 1e-9) / 6
     return max((each for each in STANDARD_CUTOFFS if 4 * step <= each <= longest), default=None)
 
 

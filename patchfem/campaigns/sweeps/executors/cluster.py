@@ -16,8 +16,6 @@ from ....core import Missing
 from ..sweep import WorkerData, compute_chunk
 from .pool import FutureExecutor
 
-# Software whose versions must be the same on all machines.
-COMPARED_VERSIONS = ("patchfem", "numpy", "python")
 CONNECT_TIMEOUT = "10s"  # Longest time to wait for a connection to the scheduler.
 
 
@@ -98,7 +96,8 @@ class Cluster(FutureExecutor):
 
         Both are answers of Dask.
         """
-        for name in COMPARED_VERSIONS:
+        # Software whose versions must be the same on all machines.
+        for name in ("patchfem", "numpy", "python"):
             own, other = ({**node["host"], **node["packages"]}[name] for node in (here, worker))
             if own != other:
                 raise Missing(

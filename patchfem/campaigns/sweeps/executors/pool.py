@@ -23,8 +23,6 @@ WORKER_ENVIRONMENT = {
     "MKL_NUM_THREADS": "1",
     "NUMBA_NUM_THREADS": "1",
 }
-# Names of the errors of a worker process that ended.
-WORKER_DEATH_ERRORS = ("BrokenProcessPool", "KilledWorker")
 
 
 class FutureExecutor:
@@ -95,7 +93,8 @@ class FutureExecutor:
             raise self.make_connection_error() from None
         except Exception as error:
             kind = type(error).__name__
-            if kind in WORKER_DEATH_ERRORS:
+            # Names of the errors of a worker process that ended.
+            if kind in ("BrokenProcessPool", "KilledWorker"):
                 return 0.0, WorkerDeath(
                     "its worker process died (killed by a user, or for lack of memory)"
                 )

@@ -83,6 +83,7 @@ class ShootingFinder:
         kernel_cache.report_compilation_to(say)
         self.joints = make_joints(model, self.numerics, patch)
         self.may_fold = may_fold(model)
+
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
         laws = [law for law, _ in self.joints.laws]
         have_elements = all(law.law == "masing" for law in laws)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from .keys.types import KeyValue
-from .keys.values import TomlTable, TomlValue
+from .types import KeyValue
+from .values import TomlTable, TomlValue
 
 # Pattern of an item with its number from 1, such as mode[1]
 _ITEM_PATTERN = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
