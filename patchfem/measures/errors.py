@@ -248,8 +248,11 @@ def split_errors(values: Values, errors) -> dict[str, Values]:
         for name, value in values.items():
             sums[name] += errors_by_name.get(name, abs(value))
 
-    by_source = {source: include_phase_error(sums) for source, sums in by_source.items()}
-    return {name: {source: sums[name] for source, sums in by_source.items()} for name in values}
+    parts_by_name: dict[str, Values] = {name: {} for name in values}
+    for source, sums in by_source.items():
+        for name, error in include_phase_error(sums).items():
+            parts_by_name[name][source] = error
+    return parts_by_name
 
 
 def add_run_error_estimates(measures: Measures, error_estimates: Values) -> Measures:
@@ -271,10 +274,11 @@ def add_run_error_estimates(measures: Measures, error_estimates: Values) -> Meas
     for name, measure in measures.items():
         if measure.error is not None:
             totals[name] = measure.error + error_estimates.get(name, 0.0)
-    totals = include_phase_error(totals)
-    return measures | {
-        name: replace(measures[name], error=float(error)) for name, error in totals.items()
-    }
+
+    updated = dict(measures)
+    for name, error in include_phase_error(totals).items():
+        updated[name] = replace(measures[name], error=float(error))
+    return updated
 
 
 def combine_errors(name: str, values: Values, parts, min_relative_error):

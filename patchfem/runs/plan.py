@@ -162,15 +162,20 @@ def plan(source) -> Plan:
 def _make_plan(model: Model) -> Plan:
     """Collect what `plan` states of a Model: its stiffnesses, dimensionless groups, numbers of unknowns and verdict."""
     if model.measured is not None:
-        # An invalid table of measured responses is reported before anything runs.
-        with name_key("measured.file"):
+        with name_key("measured.file"):  # An invalid table is reported before anything runs.
             inputs.measured.read_table(model.measured.path)
 
     # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
     values: Values = {}
-    sentences = model.describe_removed_joint()
     if model.has_bolted_patch:
-        model, values, sentences = _subtract_joint(model)
+        before = model.bolted_joint
+        model, patches, _ = joint.solve_without_joint(model)
+        values = {name: measure.value for name, measure in patches[0].measures.items()}
+    sentences = model.describe_removed_joint()
+    if values:
+        # A run has these modes of the structure alone, but subtracts the joint of its own meshes from the measured ones.
+        given = {"build_rig": before.build_rig, "subtracted": before.subtracted}
+        model = model.with_bolted(model.bolted_joint._replace(**given))
     rig = model.rig
 
     # Links in series, groups and numbers of unknowns: of the structure, the patch, the interfaces and the law.
@@ -216,17 +221,6 @@ def _make_plan(model: Model) -> Plan:
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
     return Plan(model, engine, unknowns, samples, chain, groups, tuple(sentences))
-
-
-def _subtract_joint(model: Model) -> tuple[Model, Values, list[str]]:
-    """Return a bolted rig without its joint, the static measures of the joint, and sentences on what was subtracted."""
-    before = model.bolted_joint
-    model, patches, _ = joint.solve_without_joint(model)
-    values = {name: measure.value for name, measure in patches[0].measures.items()}
-    sentences = model.describe_removed_joint()
-    # A run has these modes of the structure alone, but subtracts the joint of its own meshes from the measured ones.
-    given = model.bolted_joint._replace(build_rig=before.build_rig, subtracted=before.subtracted)
-    return model.with_bolted(given), values, sentences
 
 
 def _describe_interface_patches(friction_model) -> "tuple[of_rig.Chain, list[str]]":

@@ -114,16 +114,9 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
         except (NotConverged, np.linalg.LinAlgError):
             return None
 
-    def make_solution(levels: list[PointLevel]) -> PointSolution | None:
-        """Return the measures on the finest points; None if too few levels show no order of convergence."""
-        if len(levels) < MIN_POINT_LEVELS:
-            return None
-        estimates = _combine_refinement_series(end_levels, levels)
-        return PointSolution(estimates, levels[-1].surface, levels[-1].intervals)
-
     def judge(levels: list[PointLevel], excesses: list[float]) -> Verdict:
         """Double the points until the tolerance is met, or the next level is expensive."""
-        solution = make_solution(levels)
+        solution = _make_solution(end_levels, levels)
         is_last = solution is not None and (
             meets_tolerance(solution) or _is_next_level_expensive(levels[-1])
         )
@@ -131,7 +124,18 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
 
     with use_one_blas_thread():
         levels, _ = refine(solve, _count_first_level_points(patch_model), judge, NO_LIMIT)
-    return None if levels is None else make_solution(levels)
+    return None if levels is None else _make_solution(end_levels, levels)
+
+
+def _make_solution(end_levels: list[PointLevel], levels: list[PointLevel]) -> PointSolution | None:
+    """Return the measures on the finest points; None if too few levels show no order of convergence.
+
+    `end_levels` have finer and finer bricks of the free ends, and `levels` more and more points.
+    """
+    if len(levels) < MIN_POINT_LEVELS:
+        return None
+    estimates = _combine_refinement_series(end_levels, levels)
+    return PointSolution(estimates, levels[-1].surface, levels[-1].intervals)
 
 
 def _count_first_level_points(patch_model) -> int:
