@@ -14,6 +14,7 @@ from patchfem.contact import ContactSets
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.friction import Bonds
 from patchfem.motion_measures import energy_balance
+from patchfem.time_steps.contacts import Press
 from patchfem.time_steps.time_march import march
 
 MASS, LOAD, STILL = 0.884, 116.0, SineDrive(0.0, 2 * np.pi * 143)
@@ -65,9 +66,7 @@ def march_pressed(basis, drive, sets, name: str, cycles, steps, start=None, shea
         sets.force,
         basis.slide,
         shear,
-        sets=sets,
-        heave=basis.normal,
-        pitch=basis.pitch,
+        press=Press(sets, basis.normal, basis.pitch),
     )
     return march(basis, drive, contact, cycles, steps, window=cycles, start=start, **options)
 
