@@ -573,7 +573,9 @@ def backbone(
         key = assignments.POSITIVE_KEYS[kind][0]
         texts.append("" if values is None else format_values(key, values))
         if values is not None and not texts[-1]:
-            raise PatchfemError("backbone: the list of amplitudes or forces is empty")
+            raise PatchfemError(
+                "backbone: the list of amplitudes or forces is empty; give values, or leave it out"
+            )
     if len(over or {}) > 1:
         raise PatchfemError("backbone: `over` must have one key with its values")
 

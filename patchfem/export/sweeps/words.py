@@ -11,12 +11,10 @@ from ...core import Outcome
 from ...measures import rows
 from ...runs import refine
 from ..answer import Quantities, Quantity
-from ..quantities import format_quantity, format_value
+from ..quantities import VALUE_ROUND_OFF, format_quantity, format_value
 
 MIN_NAMED_VARIANCE_FRACTION = 0.01  # fraction of the variance below which a key is not named
 MAX_NAMED_KEYS = 3  # largest number of keys whose Sobol indices a sentence names
-# Value relative to the largest one of a sweep below which it is round-off, and shown as 0.
-VALUE_ROUND_OFF = 1e-12
 
 
 def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
@@ -32,7 +30,8 @@ def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
             )
     elif analysis.peaks:
         sentences.append(_describe_peaks(table, analysis.peaks))
-    elif analysis.limits:
+    elif analysis.limits and not analysis.extremes:
+        # of a measure with an extreme inside the range of the key, the optimum is what is asked for
         sentences.append(_describe_limit(analysis.limits))
     return (*(sentence for sentence in sentences if sentence), _describe_cases(table, analysis))
 
