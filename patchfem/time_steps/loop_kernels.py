@@ -184,8 +184,8 @@ def write_sample(system, row, sample):
 
     # Stored energy of pieces, points and grooves
     energy = 0.0
-    for k in range(points.stiffness.size):
-        energy += 0.5 * points.stiffness[k] * points.shear[Shear.VALUE, k] ** 2
+    for k in range(points.pieces.stiffness.size):
+        energy += 0.5 * points.pieces.stiffness[k] * points.pieces.shear[Shear.VALUE, k] ** 2
     sample[size + Sample.ENERGY] = energy
     sample[size + Sample.SPRINGS] = 0.0
     sample[size + Sample.LOAD] = structure.loads[row] if structure.loads.size else 0.0

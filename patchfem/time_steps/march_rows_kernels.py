@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact.set_arrays import SetArrays
-from ..friction.bonds.strip_rows_kernels import BondLists
 from .step_rows_kernels import Points
 
 # Statuses of a march
@@ -62,7 +61,7 @@ class Port(IntEnum):
 
 
 class Shear(IntEnum):
-    """Rows of `Points.shear`.
+    """Rows of `Pieces.shear`.
 
     - VALUE: coordinates [m]
     - LAST, EARLIER, FIRST: their mean rates in the last three steps [m/s], the last one first
@@ -244,7 +243,7 @@ class System(NamedTuple):
     """All arrays of a march.
 
     - structure: modes in steps of several lengths
-    - ports, points, lists: places where forces act on the modes, contact points at them, and their lists of bonds
+    - ports, points: places where forces act on the modes, and contact points at them
     - flank: grooves, see `Flank`, or (0,) without grooves
     - sets: contact sets of a patch
     - state (3, 2 n): modal coordinates and velocities, with row 0 at the start of a step, row 1 at its end without
@@ -256,7 +255,6 @@ class System(NamedTuple):
     structure: Structure
     ports: Ports
     points: Points
-    lists: BondLists
     flank: np.ndarray
     sets: SetArrays
     state: np.ndarray

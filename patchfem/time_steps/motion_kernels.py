@@ -250,30 +250,30 @@ def find_port_residual(system, level, size):
 def subtract_step(system, fraction):
     """Subtract a fraction of Newton's step from port forces and shear increments, from their rows BASE."""
     ports = system.ports
-    shear = system.points.shear
+    shear = system.points.pieces.shear
     n_ports = ports.values.shape[1]
     for p in range(n_ports):
         ports.values[Port.FORCE, p] = ports.values[Port.BASE, p] - fraction * ports.newton.step[p]
-    for k in range(system.points.stiffness.size):
+    for k in range(system.points.pieces.stiffness.size):
         shear[Shear.TRIAL, k] = shear[Shear.BASE, k] - fraction * ports.newton.step[n_ports + k]
 
 
 @njit(**NJIT_CALL)
 def store_base(system):
     """Copy port forces and shear increments to their rows BASE, from which a line search starts."""
-    shear = system.points.shear
+    shear = system.points.pieces.shear
     moves = system.ports.values
     for p in range(moves.shape[1]):
         moves[Port.BASE, p] = moves[Port.FORCE, p]
-    for k in range(system.points.stiffness.size):
+    for k in range(system.points.pieces.stiffness.size):
         shear[Shear.BASE, k] = shear[Shear.TRIAL, k]
 
 
 @njit(**NJIT_CALL)
 def extrapolate_shear(points, dt):
     """Extrapolate the increments of the pieces in a step of `dt` [s] by a parabola through the last three steps."""
-    shear = points.shear
-    for k in range(points.stiffness.size):
+    shear = points.pieces.shear
+    for k in range(points.pieces.stiffness.size):
         rate = 3 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k]) + shear[Shear.FIRST, k]
         shear[Shear.TRIAL, k] = dt * rate
 
@@ -281,8 +281,8 @@ def extrapolate_shear(points, dt):
 @njit(**NJIT_CALL)
 def advance_shear(points, dt):
     """Advance the shear coordinates by their increments in a step of `dt` [s], and store their mean rates."""
-    shear = points.shear
-    for k in range(points.stiffness.size):
+    shear = points.pieces.shear
+    for k in range(points.pieces.stiffness.size):
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
         shear[Shear.FIRST, k] = shear[Shear.EARLIER, k]
         shear[Shear.EARLIER, k] = shear[Shear.LAST, k]
@@ -330,14 +330,14 @@ def find_point_load(points, index, x, resultant):
     resultant : float
         Resultant [N].
     """
-    node = points.node[index]
-    if node >= points.nodal.size:
-        return points.averaged[node - points.nodal.size]
+    node = points.loads.node[index]
+    if node >= points.loads.nodal.size:
+        return points.loads.averaged[node - points.loads.nodal.size]
     if node >= 0:
-        return points.nodal[node]
+        return points.loads.nodal[node]
     if node == LOWER:
-        return points.share[index] * interpolate_pressure(x, points.pressure)
-    return points.share[index] * resultant
+        return points.loads.share[index] * interpolate_pressure(x, points.loads.pressure)
+    return points.loads.share[index] * resultant
 
 
 @njit(**NJIT_CALL)

@@ -15,12 +15,12 @@ from .motion_kernels import find_modal_energy, solve_holds, sum_products
 
 @njit(**NJIT_CALL)
 def average_forces(points):
-    """Write the weighted averages of the nodal forces behind each node to `points.averaged`, and their sums.
+    """Write the weighted averages of the nodal forces behind each node to `points.loads.averaged`, and their sums.
 
     The averages for slides to +x come first, then those for slides to -x. A node without load has the average 0. The sum
     behind a node ends at the first segment whose two nodes carry no load.
     """
-    forces = points.nodal
+    forces = points.loads.nodal
     n = forces.size
     for k in range(2):
         total = 0.0
@@ -28,12 +28,12 @@ def average_forces(points):
             load = 0.0
             s = j - 1 + k
             while forces[j] > 0 and 0 <= s < n - 1 and (forces[s] > 0 or forces[s + 1] > 0):
-                weights = points.averages[k, j, s]
+                weights = points.loads.averages[k, j, s]
                 load += weights[0] * forces[s] + weights[1] * forces[s + 1]
                 s += 2 * k - 1
-            points.averaged[k * n + j] = load
+            points.loads.averaged[k * n + j] = load
             total += load
-        points.averaged[2 * n + k] = total
+        points.loads.averaged[2 * n + k] = total
 
 
 @njit(**NJIT_CALL)
@@ -51,7 +51,7 @@ def find_resultant(system, forces):
     if slot < 0:
         return -1.0
     press_state(system.sets, slot, -up, turn, forces)
-    if system.points.averages.size:
+    if system.points.loads.averages.size:
         average_forces(system.points)
     energy = compute_energy(system.sets, slot, up, turn)
     return max(system.sets.reference[REFERENCE_LOAD_INDEX] - energy.heave_slope, 0.0)

@@ -223,3 +223,23 @@ def test_exact_response_curves_stand_in_order_of_their_levels(folders):
     panel = panels.make_panels(ordered, CHARTS[answer.kind])[0]
     assert [curve.name for curve in panel.curves] == ["0.5", "3", "4"]
     assert panel.title == "Steady motions" and panel.y.is_log
+
+
+def test_exact_compliance_of_response_curves_is_a_choice_of_a_menu(folders):
+    """Under forces of two levels the chart of amplitudes has a menu with compliances, which coincide for a linear rig."""
+    answer = store.read_answer(folders("curve"))
+    amplitude = answer.data["curve_amplitude"]
+    answers = {}
+    for factor in (1, 2):
+        data = {
+            "curve_amplitude": replace(amplitude, values=factor * amplitude.values),
+            "curve_compliance": replace(amplitude, values=amplitude.values / 4, unit="m N-1"),
+        }
+        answers[f"{factor}"] = replace(answer, data=answer.data | data)
+    panel = panels.make_panels(answers, CHARTS[answer.kind])[0]
+    assert [choice.title for choice in panel.choices] == [
+        "amplitude",
+        "compliance (amplitude / force)",
+    ]
+    first, second = panel.choices[1].curves
+    assert first.y.tolist() == second.y.tolist()

@@ -13,12 +13,13 @@ from ...kernel_cache.jit import njit
 NEARLY_SATURATED = 1e-3  # distance of y from 1 below which any exponent has a closed form
 SATURATED = 1e-14  # distance of |y| from 1 that is round-off
 SMALL_RATIO = 1e-4  # x below which a series replaces ln(1 + x)/x
-# Size of y below which two terms of its series at y = 0 are exact to 1e-9, for an exponent of at least 1
-SMALL_FORCE = 0.006
+TINY_FORCE = 1e-8  # y below which |y|^n is constant over a path of twice its size
 # Longest path in lengths of a Taylor step, for an exponent and a rate dy/dx of 1, and its largest change of y relative to y
-# for a fractional exponent; the terms left out are below 1e-9
+# for a fractional exponent, the second one for small y and an exponent above 1; the terms left out are below 1e-9
 MAX_PIECE = 0.11
 MAX_GROWTH = 0.11
+MAX_SMALL_GROWTH = 0.5
+SMALL_FORCE = 0.01  # y up to which the second one holds
 
 
 class FollowedPath(NamedTuple):
@@ -70,48 +71,6 @@ def _saturate(distance, power, path):
 
 
 @njit(**NJIT_KERNEL)
-def _follow_series(x, power, weight):
-    """Return y at a path x [lengths] behind y = 0, and its integral from there, as the `Piece` of that path.
-
-    `power` is the exponent n, and `weight` is c in dy/dx = 1 - c |y|^n. A path x < 0 is one that still leads to y = 0.
-    """
-    n = power
-    t = weight * abs(x) ** n
-    end = x * (1 - t / (n + 1) * (1 - n * t / (2 * n + 1)))
-    area = (
-        x
-        * x
-        * (0.5 - t / ((n + 1) * (n + 2)) * (1 - 0.5 * n * (n + 2) * t / ((2 * n + 1) * (n + 1))))
-    )
-    return Piece(x, end, area, abs(end) ** n)
-
-
-@njit(**NJIT_KERNEL)
-def _leave_zero(y, size, power, weight, left):
-    """Return the `Piece` of a path from a small y to y = 0, to twice this size, or to the end of the path that is left.
-
-    Parameters
-    ----------
-    y : float
-        y at the start.
-    size : float
-        Largest |y| at which the series is used.
-    power : float
-        Exponent n.
-    weight : float
-        Weight c of |y|^n.
-    left : float
-        Path that is left, in lengths.
-    """
-    t = weight * abs(y) ** power
-    x = y * (1 + t / (power + 1) + t * t / (2 * power + 1))
-    stop = 2 * size if y >= 0 else 0.0
-    path = min(left, stop - x)
-    end = _follow_series(x + path, power, weight)
-    return Piece(path, end.end, end.area - _follow_series(x, power, weight).area, end.power)
-
-
-@njit(**NJIT_KERNEL)
 def _expand(y, size, power, weight, left):
     """Return the `Piece` of a Taylor step of order 6, or of the shorter path that is left.
 
@@ -120,7 +79,7 @@ def _expand(y, size, power, weight, left):
     Parameters
     ----------
     y : float
-        y at the start, of at least `SMALL_FORCE`.
+        y at the start, of at least `TINY_FORCE`.
     size : float
         u at the start.
     power : float
@@ -136,7 +95,8 @@ def _expand(y, size, power, weight, left):
     rate = max(1 - weight * size, 1.0)
     path = min(left, min(MAX_PIECE / max(n, 1.0), start) / rate)
     if n % 1 != 0:
-        path = min(path, MAX_GROWTH * start / rate)
+        growth = MAX_GROWTH if start > SMALL_FORCE or n < 1 else MAX_SMALL_GROWTH
+        path = min(path, growth * start / rate)
 
     # Coefficients of |y| and u over their values at the start, in the order of the path over this piece
     h = path / y
@@ -182,8 +142,6 @@ def follow_path(y, path, power, shape):
     FollowedPath
     """
     nearly = 1.0 if power == 1.0 or power == 2.0 else NEARLY_SATURATED
-    # Below an exponent of 1 the third term of the series, of the order 3 n + 1, is larger.
-    small = SMALL_FORCE if power >= 1 else SMALL_FORCE ** (4 / (3 * power + 1))
     left = path
     area = 0.0
     size = abs(y) ** power
@@ -195,10 +153,11 @@ def follow_path(y, path, power, shape):
 
         # The power of each piece is computed again, because its relative error grows as y does.
         weight = 1.0 if y >= 0 else 1 - 2 * shape
-        if abs(y) < small:
-            piece = _leave_zero(y, small, power, weight, left)
+        size = size if left == path else abs(y) ** power
+        if abs(y) < TINY_FORCE:
+            step = min(left, 2 * TINY_FORCE)
+            piece = Piece(step, y + step * (1 - weight * size), step * y, size)
         else:
-            size = size if left == path else abs(y) ** power
             piece = _expand(y, size, power, weight, left)
         area += piece.area
         y = piece.end

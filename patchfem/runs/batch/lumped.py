@@ -7,7 +7,6 @@ is computed by a single run.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import pairwise
 from time import process_time
 from typing import NamedTuple
 
@@ -64,8 +63,10 @@ from .case_results import CaseResults, CodedColumn, has_unreadable_measurements
 BATCH_ENGINE = "points"  # name of the engine in the settings of a case
 # Longest steps per cycle of successive marches of smooth laws. With 20 steps the error of some motions is up to a hundred
 # times that with 40 steps, so that the change between the two would not show the order of convergence.
-BATCH_STEPS_PER_CYCLE = (28, 40, 80, 160, 320, 640)
-BATCH_ORDER = 4.0  # order of convergence of these marches
+BATCH_STEPS_PER_CYCLE = (28, 40, 56, 80, 112, 160, 224, 320, 448, 640)
+BATCH_STEP_RATIO = 2**0.5  # ratio of the steps of two successive marches
+# Factor between the errors of two successive marches, whose order of convergence is 4, as a power of 2
+BATCH_ORDER = 2.0
 DRIFT = "drift_per_cycle"  # name of the measure, which is the difference of two cycles
 DISTORTION = "acceleration_distortion"  # name of the measure
 # Measures whose error is not relative to their value
@@ -282,10 +283,10 @@ def refine(group: Group) -> Iterator[tuple[np.ndarray, Refined]]:
         return
 
     coarser = [march_cases(group.cases, BATCH_STEPS_PER_CYCLE[0]).values]
-    for coarse_count, count in pairwise(BATCH_STEPS_PER_CYCLE):
+    for count in BATCH_STEPS_PER_CYCLE[1:]:
         part = _select(group, remaining)
         fine = march_cases(part.cases, count)
-        errors = estimate_errors(part, fine, coarser, count / coarse_count)
+        errors = estimate_errors(part, fine, coarser)
         is_met = np.ones(remaining.size, bool)
         for name in fine.values.keys() - set(INTERNAL_VALUES):
             value = fine.values[name]
@@ -336,7 +337,7 @@ def find_distortion_size(group: Group, values: dict[str, np.ndarray]) -> np.ndar
 
 
 def estimate_errors(
-    group: Group, march: CaseMarch, coarser: Sequence[dict[str, np.ndarray]], ratio: float
+    group: Group, march: CaseMarch, coarser: Sequence[dict[str, np.ndarray]]
 ) -> dict[str, np.ndarray]:
     """Return the errors (n,) by name of a march from the values of one or two coarser ones.
 
@@ -347,19 +348,17 @@ def estimate_errors(
     march : CaseMarch
         March of the cases.
     coarser : sequence of dict
-        Values (n,) by name of marches with longer steps, from fine to coarse.
-    ratio : float
-        Length of the steps of the first of them relative to those of `march`.
+        Values (n,) by name of the marches before, from fine to coarse.
     """
     fine = march.values
     repeat_error = find_repeat_error(group, march)
     with np.errstate(all="ignore"):
         errors = estimate_convergence_errors(
-            fine, *coarser, ratio=ratio, order=BATCH_ORDER, max_order=BATCH_ORDER
+            fine, *coarser, order=BATCH_ORDER, max_order=BATCH_ORDER
         )
         # Two cycles differ by less than the errors of their events, so that a drift has no order of its own.
         drifts = ({DRIFT: values[DRIFT]} for values in (fine, *coarser))
-        errors |= estimate_convergence_errors(*drifts, ratio=ratio)
+        errors |= estimate_convergence_errors(*drifts, ratio=BATCH_STEP_RATIO)
 
         # A change that is small by accident does not give an error below the root mean square of those of all measures,
         # relative to the value of a measure or to the terms of a difference.

@@ -266,6 +266,7 @@ def add_mesh_errors(
             reason = str(error)
         except PatchfemError:
             reason = UNKNOWN_LOOP_REASON
+
     if reason:
         lacks = "no error of the mesh"
         if has_mesh_run:
