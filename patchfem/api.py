@@ -270,6 +270,8 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     """Choose the engine of a run, and count its unknowns, without solving anything.
 
+    The plan of a scene with a table [sweep] is that of its first case.
+
     Parameters
     ----------
     scene : path, str, dict, Scene or Model
@@ -296,7 +298,9 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     >>> plan.kind, plan.unknowns["modes"]
     ('rig', 1)
     """
-    return plan_model(build(scene, **sets))
+    if isinstance(scene, Model):
+        return plan_model(build(scene, **sets))
+    return plan_model(load(scene, **sets))
 
 
 @_make_verb
@@ -569,7 +573,9 @@ def backbone(
         key = assignments.POSITIVE_KEYS[kind][0]
         texts.append("" if values is None else format_values(key, values))
         if values is not None and not texts[-1]:
-            raise PatchfemError("backbone: the list of amplitudes or forces is empty")
+            raise PatchfemError(
+                "backbone: the list of amplitudes or forces is empty; give values, or leave it out"
+            )
     if len(over or {}) > 1:
         raise PatchfemError("backbone: `over` must have one key with its values")
 

@@ -99,13 +99,18 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
 
     settings = []
     for value in values:
-        label = f"{1e6 * value:.4g} um" if name == "element_size" else f"{value:g}"
+        label = format_setting(name, value)
         changed = _change_setting(model, name, value)
         settings.append(Setting(label, float(value), f"{words} {label}", changed))
     if name == TOLERANCE_SETTING:
         return settings
     automatic = _change_setting(model, name, None)
     return [*settings, Setting("by tolerance", None, f"{words} set by the tolerance", automatic)]
+
+
+def format_setting(name: str, value: float) -> str:
+    """Return a value [SI] of the numerical setting `name` as text."""
+    return f"{1e6 * value:.4g} um" if name == "element_size" else f"{value:g}"
 
 
 def _change_setting(model: Model, name: str, value: float | None) -> Model:

@@ -78,7 +78,7 @@ def plan(
     ) = False,
 ):
     """Print what a run of SCENE would compute: sizes, the stiffnesses in series and dimensionless groups. Of a
-    scene with [sweep], give the values of one case with --set.
+    scene with [sweep] it is the first case; --set chooses another one.
 
     Example: patchfem plan rig.toml --set contact.tilt.angle="1 mrad"
     """

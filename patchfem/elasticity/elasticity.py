@@ -262,9 +262,9 @@ class Piece:
             )
         shortest = min(mesh.tributary_lengths().min(), mesh.first_row_height)
         return (
-            f"the shortest cell is {format_length(shortest, 3)} in a piece of "
-            f"{format_length(mesh.length, 3)} x {format_length(mesh.height, 3)}: use longer "
-            "cells (contact.element_size, or the cells of contact.mesh)"
+            f"the shortest cell is {format_length(shortest, 3)} in a piece of {format_length(mesh.length, 3)} x "
+            f"{format_length(mesh.height, 3)}, so that round-off spoils the stiffness: use longer cells "
+            "(contact.element_size, or the cells of contact.mesh)"
         )
 
 

@@ -89,7 +89,7 @@ def compute_measures(case: Case, state: State, record: Record) -> dict[str, floa
 
 
 def split_integrals(case: Case, y) -> np.ndarray:
-    """Return friction work [J], path of slip [m] and loss [J] (..., M, 3) of the interfaces in states y (..., n)."""
+    """Return friction work [J], irreversible slide [m] and loss [J] (..., M, 3) of the interfaces in states y (..., n)."""
     count = N_FACE_INTEGRALS * case.rig.faces.shape[0]
     y = y[..., y.shape[-1] - N_INTEGRALS - count : y.shape[-1] - N_INTEGRALS]
     return y.reshape(*y.shape[:-1], -1, N_FACE_INTEGRALS)

@@ -42,6 +42,8 @@ MAX_KINKED_CHANGE = 1e-6
 # Largest force at a reversal point after a correction, relative to the friction limit, which no motion exceeds; corrections
 # are exact to MAX_KINKED_CHANGE.
 MAX_FORCE_RATIO = 1 + 10 * MAX_KINKED_CHANGE
+# Largest change over a period from which one more correction leads to a motion that is followed
+MAX_FOLLOWED_CHANGE = 1e-7
 N_CHECKED = 10  # periods that such a motion is followed
 CHECK_FACTOR = 10.0  # largest distance after these periods, relative to the change of a period that counts as none
 # Largest Floquet multiplier of a stable motion; above 1, because the derivatives of the map are differences.
@@ -248,10 +250,9 @@ def follow_periodic_motion(
     shooting = Shooting(case, odd_laws)
     shooting.state, shooting.map = start
     shooting.relax(1)
-    tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
-    before, change = shooting.converge(tolerance, N_RELAXED, MAX_KINKED_CHANGE)
+    before, change = shooting.converge(MAX_FOLLOWED_CHANGE, N_RELAXED, MAX_KINKED_CHANGE)
 
-    # One more correction, after which the measured period begins nearer to the periodic motion
+    # One more correction, after which the change is a small part of it at the start of the measured period
     if shooting.map is not None:
         shooting.correct(before)
         before = shooting.state

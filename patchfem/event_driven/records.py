@@ -282,7 +282,7 @@ class Probe(IntEnum):
 
     - FACES: first column of the interfaces
     - FORCE: friction force [N]
-    - SLIP: path of slip [m]
+    - SLIP: irreversible slide [m], with its sign
     - SLIDE: relative displacement [m]
     - LOAD: normal load, 0 after lift-off [N]
     - COUNT: number of columns of an interface

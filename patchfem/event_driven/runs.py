@@ -116,7 +116,7 @@ class Motion:
         rests = (self._columns(rows, 2) == 0) & (rig.faces[:m, Face.RIGID] > 0)
         slide_rates[rests] = 0.0
 
-        # The integrals are friction work, path of slip and loss. Work that is not lost is stored; none is created.
+        # The integrals are friction work, irreversible slide and loss. Work that is not lost is stored; none is created.
         work = integrals[:, :m, 0].sum(1)
         loss = integrals[:, :m, 2].sum(1)
         supplied = work

@@ -169,7 +169,8 @@ def make_tables(answer: Answer) -> list[Table]:
         known = {name for row in rows for name in row}
         columns = [one for one in parse_columns(table.columns) if one.name in known]
         headings = [_find_heading(answer, column) for column in columns]
-        texts = [[_format_cell(row, column) for column in columns] for row in rows]
+        largest = _find_largest(rows, columns)
+        texts = [[_format_cell(row, column, largest) for column in columns] for row in rows]
         tables.append({"title": table.title, "headings": headings, "rows": texts})
     return [table for table in tables if table["rows"]]
 
@@ -180,20 +181,31 @@ def _find_heading(answer: Answer, column: Column) -> str:
     return heading.replace("_", " ")
 
 
-def _format_cell(row: Cells, column: Column) -> str:
-    """Return a cell of a table as text.
+def _find_largest(rows: list[Cells], columns: list[Column]) -> dict[str, float]:
+    """Return the largest magnitude of the quantities in each of some columns by name; 0 without any."""
+    largest = {}
+    for column in columns:
+        cells = [row.get(column.name) for row in rows]
+        values = [cell.value for cell in cells if isinstance(cell, Quantity) and cell.value]
+        largest[column.name] = max(map(abs, values), default=0.0)
+    return largest
 
-    A missing value is a dash.
-    """
+
+def _format_cell(row: Cells, column: Column, largest: dict[str, float]) -> str:
+    """Return a cell of a table as text; a missing value is a dash, and round-off beside the `largest` of the column is 0."""
     cell = row.get(column.name)
     if cell is not None and column.style == "quantity":
         cell = make_quantity(row)
     if column.style == "rounded":
         number = getattr(cell, "value", cell)
+        if number is not None and abs(number) <= quantities.VALUE_ROUND_OFF:
+            return "0"
         return "-" if number is None else format_number(number, 3)
     if cell is None:
         return "-"
     if isinstance(cell, Quantity):
+        if cell.value and abs(cell.value) <= quantities.VALUE_ROUND_OFF * largest[column.name]:
+            return "0"
         return quantities.format_quantity(column.name, cell)
     if isinstance(cell, float):
         return f"{100 * cell:+.3g} %" if column.style == "percent" else format_number(cell, 6)

@@ -1,6 +1,7 @@
 """The answer of `cost`: numerical error against CPU time, for several tolerances or values of a setting."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..campaigns import convergence
@@ -15,6 +16,7 @@ from ..campaigns.cost import (
     find_measures_with_error,
     rate_run,
 )
+from ..campaigns.numerical_settings import format_setting
 from ..formatting import format_number
 from ..model.model import Model
 from ..runs.joint import find_source
@@ -94,7 +96,9 @@ def make_cost_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         sentence = None if one == TOLERANCE_SETTING else describe_best_setting(curve, tolerance)
         details[one] = {"runs": [describe_run(row) for row in knob_rows], "sentence": sentence}
         if one != TOLERANCE_SETTING:
-            converged += describe_convergence(curve, one)
+            converged += describe_convergence(
+                curve, one, [run for part in curves.values() for run in part]
+            )
     main = _find_main_measure(runs)
 
     # the scene as it is, or the run that the sentence names
@@ -137,8 +141,10 @@ def describe_run(row: Row) -> JsonObject:
     return make_details("cost_run", row, worst=worst, meets_tolerance=is_met, **parts)
 
 
-def describe_convergence(runs: list[Cost], setting: str) -> list[JsonObject]:
-    """Return a row for each key quantity with an error: its finest value, observed order, and sufficient settings.
+def describe_convergence(
+    runs: list[Cost], setting: str, every_run: Sequence[Cost] = ()
+) -> list[JsonObject]:
+    """Return a row for each key quantity with an error: its best value, observed order, and sufficient settings.
 
     Parameters
     ----------
@@ -146,30 +152,38 @@ def describe_convergence(runs: list[Cost], setting: str) -> list[JsonObject]:
         Runs with rising accuracy.
     setting : str
         Name of the setting that varies.
+    every_run : sequence of Cost
+        All runs of the scene, of which one may be more accurate than these.
 
     Returns
     -------
     list of dict
-        `setting`, `measure`, CPU `seconds` of the runs with a fixed setting and their relative `changes` from the finest,
-        `value`, `unit`, `error` and `text` of the finest run, observed `order`, and for each of SUFFICIENT_TOLERANCES the
-        coarsest sufficient setting with its CPU time, or "none".
+        `setting`, `measure`, CPU `seconds` of the runs with a fixed setting and their relative `changes` from the most
+        accurate value, its `value`, `unit`, `error` and `text`, observed `order`, and for each of SUFFICIENT_TOLERANCES the
+        coarsest sufficient setting with its CPU time, that expected from the stated errors of the two finest runs
+        ("about"), or "none".
     """
     known = find_measures_with_error(runs)
     rows = []
     for name in quantities.KEY_QUANTITY_NAMES:
         if name not in known or not all(name in run.measures for run in runs):
             continue
-        found = convergence.measure_convergence(runs, setting, name)
+        reference = convergence.find_reference(every_run or runs, name)
+        found = convergence.measure_convergence(runs, setting, name, reference)
         if max(found.changes) < convergence.ROUND_OFF:
             continue  # the setting has no effect on this measure
-        finest = Quantity(found.finest.value, found.finest.unit, found.finest.error)
-        row = {"setting": setting, "measure": name} | finest.as_json()
-        row |= {"text": quantities.format_quantity(name, finest)}
+        best = Quantity(found.reference.value, found.reference.unit, found.reference.error)
+        row = {"setting": setting, "measure": name} | best.as_json()
+        row |= {"text": quantities.format_quantity(name, best)}
         seconds = [run.seconds for run in runs if run.value is not None]
         row |= {"order": found.order, "changes": found.changes, "seconds": seconds}
         for column, tolerance in SUFFICIENT_TOLERANCES.items():
-            run = convergence.find_sufficient_run(runs, name, found, tolerance)
-            row[column] = f"{run.label}, {format_number(run.seconds, 2)} CPU s" if run else "none"
+            row[column] = "none"
+            if run := convergence.find_sufficient_run(runs, name, found, tolerance):
+                row[column] = f"{run.label}, {format_number(run.seconds, 2)} CPU s"
+            elif run := convergence.extrapolate_sufficient_run(runs, setting, name, tolerance):
+                label = format_setting(setting, float(f"{run.value:.2g}"))
+                row[column] = f"about {label}, {format_number(run.seconds, 1)} CPU s"
         rows.append(row)
     return rows
 

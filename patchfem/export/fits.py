@@ -269,10 +269,13 @@ def describe_rows_fit(fitted: FittedKeys) -> Parts:
     search = fitted.fit
     all_scores = comparison.compute_scores(fitted)
     totals = {name: score["all"] for name, score in all_scores.items() if score is not None}
-    texts = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in totals.items() if value]
+    texts = []
+    for name, value in totals.items():
+        if value:
+            texts.append(f"{format_number(value, 3)} for those {name.replace('_', ' ')}")
     residual = (
-        f"The rms of ln(computed/measured) is {', '.join(texts)}; {search.n_best} of {search.descent_rms.size} starts "
-        "led to within 1 % of the best."
+        f"The rms of ln(computed/measured) over readings is {', '.join(texts)}; {search.n_best} of "
+        f"{search.descent_rms.size} starts led to within 1 % of the best."
     )
     scores = {f"score_{name}": Quantity(value) for name, value in totals.items()}
     details = {

@@ -20,6 +20,8 @@ from . import surface_definitions
 from .answer import Definition, Quantities, Quantity
 from .rows import QUANTITIES
 
+# Value relative to the largest one of a column below which it is round-off, and shown as 0
+VALUE_ROUND_OFF = 1e-12
 MAX_KEY_QUANTITIES = 10  # largest number of key quantities on a page and on the screen
 # display units of wear coefficients and of slopes
 DISPLAY_UNIT_LADDERS = UNIT_LADDERS | {
@@ -61,9 +63,11 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
         return surface_definitions.find_surface_definition(
             name
         ) or surface_definitions.find_surface_definition(remove_interface_number(name))
-    # quantities of a sweep: limits of its key, and extremes of measures
+    # quantities of a sweep: limits of its key, and extremes of measures and their places
     measure = name.removeprefix("largest_").removeprefix("smallest_")
-    base_name = "limit" if name.startswith("limit_") else remove_interface_number(measure)
+    base_name = remove_interface_number(measure)
+    if name.startswith(("limit_", "place_of_")):
+        base_name = name.partition("_")[0]
     found = _find_row(name) or _find_row(measure) or _find_row(base_name)
     return found and Definition(found.unit, found.text)
 

@@ -270,7 +270,7 @@ def _collect_levels(result: Result) -> Variables:
 
 
 def _collect_regimes(result: Result) -> Variables:
-    """Return the regime at each point of a response curve, such as "stick-slip", and where the curve turns back."""
+    """Return the regime at each point of a response curve, such as "stick-slip", its compliance, and its folds."""
     curve = None if result.motion.steady is None else result.motion.steady.curve
     if curve is None:
         return {}
@@ -281,6 +281,10 @@ def _collect_regimes(result: Result) -> Variables:
     columns = (
         {"curve_fold": (folds, unit), "curve_fold_error": (errors, unit)} if folds.size else {}
     )
+    rig = result.plan.model.rig
+    if not rig.drive.signal.moving:
+        forces = curve["level"] * rig.modes.mass
+        columns["curve_compliance"] = curve["amplitude"] / forces, "m N-1"
     return {"curve_regime": regimes} | make_variables("run", **columns)
 
 

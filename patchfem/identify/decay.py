@@ -31,7 +31,8 @@ def fit_decay(time, value) -> FittedModes:
     """
     if time.size < MIN_DECAY_SAMPLES:
         raise PatchfemError(
-            f"the free decay has {time.size} samples; at least {MIN_DECAY_SAMPLES} are needed"
+            f"the free decay has {time.size} samples; at least {MIN_DECAY_SAMPLES} are needed: record it longer, or with "
+            "a higher sampling rate"
         )
     time = time - time[0]
     problem = SinusoidProblem(time, value, [np.ones(time.size)])

@@ -60,7 +60,8 @@ def read_datasets(path) -> list[Dataset]:
     # Only these three kinds of datasets are read. Files of other programs contain many more.
     path = Path(path)
     check_file(path, "export fewer channels or a part of the record")
-    with refuse_damage(f"{path}: cannot be read as a universal file"):
+    remedy = "; export it anew, with datasets 55, 58 or 164"
+    with refuse_damage(f"{path}: cannot be read as a universal file", remedy):
         file = pyuff.UFF(str(path))
         types = [int(kind) for kind in file.get_set_types()]
         numbers = [number for number, kind in enumerate(types) if kind in (55, 58, 164)]

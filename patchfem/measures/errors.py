@@ -199,15 +199,35 @@ def add_errors(
     size : float
         Displacement caused by the drive alone [m], which limits the floors of displacements.
     """
+    parts_by_name = split_errors(values, errors)
+    totals = {}
+    for name, parts in parts_by_name.items():
+        totals[name] = combine_errors(name, values, parts.values(), min_relative_error)
+
     measures = {}
-    for name, parts in split_errors(values, errors).items():
-        value = float(values[name])
-        error = combine_errors(name, values, parts.values(), min_relative_error)
+    for name, error in include_phase_error(totals).items():
+        unit = find_definition(name).unit
         floor = float(find_error_floor(name, values, size))
         measures[name] = Measure(
-            value, find_definition(name).unit, float(error), floor, parts=parts
+            float(values[name]), unit, float(error), floor, parts=parts_by_name[name]
         )
     return measures
+
+
+def include_phase_error(errors: Values) -> Values:
+    """Return errors by name, of which that of the stick fraction is at least that of the phase at which slip starts.
+
+    Slip starts at the instants that end the time of stick, so that an error of pi of the phase is one of 1 of the fraction.
+
+    Parameters
+    ----------
+    errors : dict
+        Errors by name, each a float or (n,), NaN where it is unknown.
+    """
+    if STICK_FRACTION not in errors or SLIP_START_PHASE not in errors:
+        return errors
+    least = errors[SLIP_START_PHASE] / np.pi
+    return errors | {STICK_FRACTION: np.fmax(errors[STICK_FRACTION], least)}
 
 
 def split_errors(values: Values, errors) -> dict[str, Values]:
@@ -222,19 +242,14 @@ def split_errors(values: Values, errors) -> dict[str, Values]:
     errors : sequence of (str, dict)
         Error sources with errors by name (`estimate_errors`).
     """
-    parts_by_name = {}
-    for name, value in values.items():
-        parts = {}
-        for source, errors_by_name in errors:
-            parts[source] = parts.get(source, 0.0) + errors_by_name.get(name, abs(value))
-        parts_by_name[name] = parts
+    by_source: dict[str, Values] = {}
+    for source, errors_by_name in errors:
+        sums = by_source.setdefault(source, dict.fromkeys(values, 0.0))
+        for name, value in values.items():
+            sums[name] += errors_by_name.get(name, abs(value))
 
-    # Slip starts at the same instants that end the time of stick.
-    stick_parts = parts_by_name.get(STICK_FRACTION, {})
-    for source, error in parts_by_name.get(SLIP_START_PHASE, {}).items():
-        if source in stick_parts:
-            stick_parts[source] = max(stick_parts[source], error / np.pi)
-    return parts_by_name
+    by_source = {source: include_phase_error(sums) for source, sums in by_source.items()}
+    return {name: {source: sums[name] for source, sums in by_source.items()} for name in values}
 
 
 def add_run_error_estimates(measures: Measures, error_estimates: Values) -> Measures:
@@ -252,12 +267,14 @@ def add_run_error_estimates(measures: Measures, error_estimates: Values) -> Meas
     dict
         Measure by name.
     """
-    updated = dict(measures)
+    totals = {}
     for name, measure in measures.items():
         if measure.error is not None:
-            error = measure.error + error_estimates.get(name, 0.0)
-            updated[name] = replace(measure, error=error)
-    return updated
+            totals[name] = measure.error + error_estimates.get(name, 0.0)
+    totals = include_phase_error(totals)
+    return measures | {
+        name: replace(measures[name], error=float(error)) for name, error in totals.items()
+    }
 
 
 def combine_errors(name: str, values: Values, parts, min_relative_error):

@@ -6,6 +6,7 @@ definition of a steady motion depends on the kind of drive. `settling` has the c
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from .measures import Measures
 from .rows import AMPLITUDE, STEADY_AMPLITUDE
 from .settling import (
     MOTION_CLASSES,
+    MotionEnds,
     classify_motions,
     estimate_ringing,
     join_cycles,
@@ -76,78 +78,152 @@ def judge_outcome(
     steady : dict
         The measure relative_displacement_amplitude_steady [m] by its name; {} if it is not reported.
     """
-    tolerance, min_decay_rate = limits
-    is_random = hasattr(drive, "band")
-    is_stuck = solution.outcome is Outcome.STUCK and not is_random
-    if is_stuck and is_still_loading(solution.window, drive.period, tolerance):
-        return Outcome.TRANSIENT, {}
-
-    # An outcome that the engine knows is final, unless the rig still vibrates above its stuck interfaces.
-    is_ringing = not level_cycles and find_ringing(solution, measures, limits, drive) > 0
-    if solution.outcome is not None and not is_ringing:
-        return solution.outcome, {}
-
-    # These drives have no cycles that could be compared.
-    if is_random:
-        is_stationary = stationary.is_stationary(solution.window, drive)
-        return Outcome.DONE if is_stationary else Outcome.TRANSIENT, {}
-    if not drive.segments and structure.drive_sizes.count_repeat_cycles(drive) is None:
-        return Outcome.TRANSIENT, {}
+    known = _find_outcome_without_cycles(solution, measures, limits, drive, level_cycles)
+    if known is not None:
+        return known, {}
 
     # The levels before the last one have other amplitudes.
-    cycles = slice(-int(level_cycles), None) if level_cycles else slice(None)
-    extremes = np.asarray(solution.extremes, float)[cycles]
-    window = structure.drive_sizes.count_cycles(solution.window.time, drive)
-    windows = measure_windows(extremes, window)
-    scale = (
-        structure.drive_sizes.find_max_acceleration(drive)
-        / structure.drive_sizes.find_drive_omega(drive) ** 2
+    last_level = slice(-int(level_cycles), None) if level_cycles else slice(None)
+    cycles = _Cycles(
+        np.asarray(solution.extremes, float)[last_level],
+        solution.phasors[last_level] if structure.drive_sizes.is_sinusoidal(drive) else None,
+        structure.drive_sizes.count_cycles(solution.window.time, drive),
+        AMPLITUDE_ROUND_OFF * _find_displacement_scale(drive),
     )
-    floor = AMPLITUDE_ROUND_OFF * scale
-    amplitude = measures[AMPLITUDE]
+    if not structure.drive_sizes.is_periodic(drive):
+        return _judge_aperiodic_motion(cycles, measures, limits, drive), {}
 
-    # The criteria are vectorized over motions, of which there is one.
-    is_periodic = structure.drive_sizes.is_periodic(drive)
+    # Without a common period of drive and load in the window, no motion is steady.
     count = int(repeat or 1)
-    if is_periodic and not window % count:
-        # A motion under another drive than a sine may have no first harmonic.
-        phasors = np.ptp(extremes, axis=1) / 2
-        if structure.drive_sizes.is_sinusoidal(drive):
-            phasors = solution.phasors[cycles]
-        decay = max(min_decay_rate, 0.0) * window * drive.period
-        # Only the cycles of a common period of drive and load can be compared.
-        extremes, phasors = join_cycles(extremes, phasors, count)
-        classes, steady = judge_motions(
-            extremes[None], phasors[None], window // count, tolerance, floor, decay
-        )
-        drift = np.inf if count == 1 else windows.find_drift(window)
-    else:
-        if drive.segments and not windows.amplitude[-1] > max(floor, amplitude.floor):
-            return Outcome.STEADY, {}
-        classes = classify_motions(windows.amplitude[None], tolerance, floor)
-        drift = windows.find_drift(window)
-    outcome = MOTION_CLASSES[classes[0]]
-    if is_periodic and window % count:
+    tolerance, min_decay_rate = limits
+    if cycles.window % count:
+        outcome = cycles.classify(tolerance)
         return Outcome.TRANSIENT if outcome is Outcome.STEADY else outcome, {}
+    decay = max(min_decay_rate, 0.0) * cycles.window * drive.period
+    classes, steady = cycles.judge(count, tolerance, decay)
+    outcome = MOTION_CLASSES[classes[0]]
 
     # For several tones, the drift from cycle to cycle is part of their beat.
-    if (is_periodic or drive.segments) and _has_drift(measures, tolerance, drift):
-        outcome = Outcome.TRANSIENT if outcome is Outcome.STEADY else outcome
-    if not is_periodic:
-        # A released motion grows only if a mode gains energy. Under a step it may grow.
-        is_released = drive.segments and not drive.segments[-1].constant
-        if outcome is Outcome.GROWS and is_released and min_decay_rate >= 0:
-            outcome = Outcome.TRANSIENT
-        return outcome, {}
-    if is_ringing:
+    drift = np.inf if count == 1 else cycles.find_drift()
+    if outcome is Outcome.STEADY and _has_drift(measures, tolerance, drift):
+        outcome = Outcome.TRANSIENT
+    if not level_cycles and find_ringing(solution, measures, limits, drive) > 0:
         outcome = Outcome.TRANSIENT
 
+    amplitude = measures[AMPLITUDE]
     error = amplitude.error or 0.0
     steady = select_reported(steady, np.array([outcome]), amplitude.value, error, tolerance)
     if np.isnan(steady).any():
         return outcome, {}
     value, error = steady[:, 0].tolist()
     return outcome, {STEADY_AMPLITUDE: Measure(value, "m", error, amplitude.floor)}
+
+
+def _find_outcome_without_cycles(
+    solution, measures: Measures, limits: tuple[float, float], drive, level_cycles: float
+) -> Outcome | None:
+    """Return the outcome of a motion that follows without a comparison of its cycles; None for other motions.
+
+    The parameters are those of `judge_outcome`: a Solution, its measures by name, the tolerance and the smallest decay rate
+    [1/s], the drive, and the number of cycles per level.
+    """
+    is_random = hasattr(drive, "band")
+    is_stuck = solution.outcome is Outcome.STUCK and not is_random
+    if is_stuck and is_still_loading(solution.window, drive.period, limits[0]):
+        return Outcome.TRANSIENT
+
+    # An outcome that the engine knows is final, unless the rig still vibrates above its stuck interfaces.
+    is_ringing = not level_cycles and find_ringing(solution, measures, limits, drive) > 0
+    if solution.outcome is not None and not is_ringing:
+        return solution.outcome
+
+    # These drives have no cycles that could be compared.
+    if is_random:
+        is_stationary = stationary.is_stationary(solution.window, drive)
+        return Outcome.DONE if is_stationary else Outcome.TRANSIENT
+    if not drive.segments and structure.drive_sizes.count_repeat_cycles(drive) is None:
+        return Outcome.TRANSIENT
+    return None
+
+
+class _Cycles(NamedTuple):
+    """Cycles of a motion by which its outcome is judged.
+
+    - extremes (k, 2): smallest and largest output of each cycle [m].
+    - phasors (k,): first harmonic of the output in each cycle [m]; None under another drive than a sine.
+    - window: number of cycles of a window.
+    - floor: amplitude that is round-off [m].
+    """
+
+    extremes: np.ndarray
+    phasors: np.ndarray | None
+    window: int
+    floor: float
+
+    def classify(self, tolerance: float) -> Outcome:
+        """Return the outcome that follows from the amplitudes of the windows alone."""
+        amplitude = measure_windows(self.extremes, self.window).amplitude
+        return MOTION_CLASSES[classify_motions(amplitude[None], tolerance, self.floor)[0]]
+
+    def find_drift(self) -> float:
+        """Return the drift of the midpoint [m] per cycle, from window to window."""
+        return measure_windows(self.extremes, self.window).find_drift(self.window)
+
+    def judge(self, count: int, tolerance: float, decay: float) -> MotionEnds:
+        """Return the class of the motion and its steady amplitude, as arrays over one motion.
+
+        Parameters
+        ----------
+        count : int
+            Number of cycles in the common period of drive and load, which alone can be compared.
+        tolerance : float
+            Relative tolerance of the scene.
+        decay : float
+            Logarithmic decay of the slowest mode over a window [1].
+        """
+        # A motion under another drive than a sine may have no first harmonic.
+        phasors = np.ptp(self.extremes, axis=1) / 2 if self.phasors is None else self.phasors
+        extremes, phasors = join_cycles(self.extremes, phasors, count)
+        n_windows = self.window // count
+        return judge_motions(extremes[None], phasors[None], n_windows, tolerance, self.floor, decay)
+
+
+def _find_displacement_scale(drive) -> float:
+    """Return the displacement a/omega^2 [m] of a drive with its largest acceleration a."""
+    largest = structure.drive_sizes.find_max_acceleration(drive)
+    return largest / structure.drive_sizes.find_drive_omega(drive) ** 2
+
+
+def _judge_aperiodic_motion(
+    cycles: _Cycles, measures: Measures, limits: tuple[float, float], drive
+) -> Outcome:
+    """Return the outcome of a motion after a release or a step, or under tones without a common period.
+
+    Parameters
+    ----------
+    cycles : _Cycles
+        Cycles of the motion.
+    measures : dict
+        Measure by name.
+    limits : tuple
+        Relative tolerance, and smallest decay rate of a mode [1/s].
+    drive
+        Drive of the last cycles.
+    """
+    tolerance, min_decay_rate = limits
+    amplitude = measure_windows(cycles.extremes, cycles.window).amplitude
+    if drive.segments and not amplitude[-1] > max(cycles.floor, measures[AMPLITUDE].floor):
+        return Outcome.STEADY
+    outcome = cycles.classify(tolerance)
+    if outcome is Outcome.STEADY and drive.segments:
+        if _has_drift(measures, tolerance, cycles.find_drift()):
+            return Outcome.TRANSIENT
+
+    # A released motion grows only if a mode gains energy. Under a step it may grow.
+    is_released = drive.segments and not drive.segments[-1].constant
+    if outcome is Outcome.GROWS and is_released and min_decay_rate >= 0:
+        return Outcome.TRANSIENT
+    return outcome
 
 
 def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:

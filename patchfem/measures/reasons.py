@@ -121,6 +121,7 @@ def find_invalid(
     if not is_periodic:
         reasons |= dict.fromkeys(_list_open_loops(measures, window, drive), OPEN_LOOP_REASON)
 
+    # Without a steady estimate, a transient motion states why.
     invalid = {}
     for name, reason in reasons.items():
         if name in measures:

@@ -123,7 +123,7 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
     if 1 - covered > 1e-3:
         notes.append(
             f"{scan.source}: the scan does not cover {100 * (1 - covered):.2g} % of the face, at its sides; the nearest "
-            "heights stand there"
+            "heights are taken there"
         )
     return replace(part, z=frozen_array(fill_nearest(part.z)), notes=tuple(notes))
 

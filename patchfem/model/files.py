@@ -62,6 +62,7 @@ def find_file_faults(
         path = folder / file
         if not file_exists(path):
             continue
+
         checked = _select_interface(key, tables)
         # The kind of a drive tells how its file is read.
         compare = FILE_CHECKS.get(checked.key) if is_valid or key == "drive.file" else None

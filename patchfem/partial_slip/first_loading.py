@@ -208,7 +208,7 @@ def slip_from_rest(
     if not solution.residual <= SLIP_RESIDUAL_TOL:
         raise NotConverged(
             f"contact: partial slip did not converge; after {solution.n_iterations} steps the displacement "
-            f"is wrong by {solution.residual:.1e} of the largest one"
+            f"is wrong by {solution.residual:.1e} of the largest one; change contact.element_size"
         )
     return solution
 

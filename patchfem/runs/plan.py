@@ -8,7 +8,8 @@ the memory of the run (`list_memory_parts`), and refuses a run that needs more t
 import mmap
 from collections.abc import Callable
 from contextlib import suppress
-from math import inf
+from dataclasses import replace
+from math import inf, prod
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from ..effects import EFFECTS, law_has_trait
 from ..model.model import Model, build
 from ..model.source import locate_errors, name_key
 from ..scene import refuse_attribute
+from ..scene.overrides import BaseScene
 from . import joint, refine
 from .bench import engine as of_bench
 from .interfaces import bond_lists
@@ -131,7 +133,7 @@ class Plan:
 
 
 def plan(source) -> Plan:
-    """Plan the run of a Scene or a Model.
+    """Plan the run of a Scene or a Model, or the first case of a Scene with a table [sweep].
 
     Parameters
     ----------
@@ -143,9 +145,18 @@ def plan(source) -> Plan:
     PatchfemError
         If the scene cannot be run, with the position of the error in the scene.
     """
-    model = source if isinstance(source, Model) else build(source)
-    with locate_errors(model.source):
-        return _make_plan(model)
+    if isinstance(source, Model):
+        with locate_errors(source.source):
+            return _make_plan(source)
+    if not source.sweep:
+        return plan(build(source))
+
+    # A key that only [sweep] names has its first value in each scene of the file; others get theirs.
+    first = [f"{axis.key}={axis.texts[0]}" for axis in source.sweep]
+    count = prod(len(axis.texts) for axis in source.sweep)
+    case = plan(build(BaseScene(source).override(first)))
+    sentence = f"this is the first of {count} cases of [sweep], {', '.join(first)}; `--set` of its keys chooses another one"
+    return replace(case, verdict=(sentence, *case.verdict))
 
 
 def _make_plan(model: Model) -> Plan:
@@ -157,16 +168,9 @@ def _make_plan(model: Model) -> Plan:
 
     # The stiffness of the joint is subtracted from the measured modes of a bolted rig first.
     values: Values = {}
-    if model.has_bolted_patch:
-        before = model.bolted_joint
-        model, patches, _ = joint.solve_without_joint(model)
-        values = {name: measure.value for name, measure in patches[0].measures.items()}
     sentences = model.describe_removed_joint()
-    if values:
-        # A run has these modes of the structure alone, but subtracts the joint of its own meshes from the measured ones.
-        model = model.with_bolted(
-            model.bolted_joint._replace(build_rig=before.build_rig, subtracted=before.subtracted)
-        )
+    if model.has_bolted_patch:
+        model, values, sentences = _subtract_joint(model)
     rig = model.rig
 
     # Links in series, groups and numbers of unknowns: of the structure, the patch, the interfaces and the law.
@@ -188,26 +192,21 @@ def _make_plan(model: Model) -> Plan:
         engine, counts, samples = of_bench.count_bench_sizes(model)
         unknowns |= counts
         groups = of_bench.compute_dimensionless_groups(model)
+
     if model.patch is not None:
         chain |= patch_plan.stiffness_chain(model.patch)
         chain |= patch_plan.find_solved_links(chain, values)
         groups |= patch_plan.compute_patch_groups(model)
         patch_sentences += patch_plan.describe_tilt(groups, model.patch)
-    for number, interface in enumerate(() if rig is None else rig.friction.interfaces):
-        if interface.patch is not None:
-            for name, link in patch_plan.stiffness_chain(interface.patch).items():
-                if link != "rigid":
-                    chain[add_interface_number(name, number)] = link
-            # The whole patch slips when its pieces are sheared by mu_s N/k.
-            slip_force = interface.numbers.static * interface.load
-            slip_length = slip_force / interface.patch.pieces.shear_stiffness
-            patch_sentences.append(
-                patch_plan.describe_shear(interface.patch, slip_length, rig.friction.names[number])
-            )
+    if model.has_interface_patches:
+        links, shear_sentences = _describe_interface_patches(rig.friction)
+        chain |= links
+        patch_sentences += shear_sentences
+
+    # Stiffness of the law, and the part of the force that the pad carries; the bonds beyond its edges have the rest
     if model.friction is not None and model.nominal_load > 0:
         chain |= _find_law_stiffnesses(model)
     if model.spread_share is not None:
-        # The pad carries this part of the force, and the bonds beyond its edges the rest.
         groups["share_of_the_spread"] = model.spread_share
 
     # What the numbers say of the motion
@@ -217,6 +216,36 @@ def _make_plan(model: Model) -> Plan:
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
     return Plan(model, engine, unknowns, samples, chain, groups, tuple(sentences))
+
+
+def _subtract_joint(model: Model) -> tuple[Model, Values, list[str]]:
+    """Return a bolted rig without its joint, the static measures of the joint, and sentences on what was subtracted."""
+    before = model.bolted_joint
+    model, patches, _ = joint.solve_without_joint(model)
+    values = {name: measure.value for name, measure in patches[0].measures.items()}
+    sentences = model.describe_removed_joint()
+    # A run has these modes of the structure alone, but subtracts the joint of its own meshes from the measured ones.
+    given = model.bolted_joint._replace(build_rig=before.build_rig, subtracted=before.subtracted)
+    return model.with_bolted(given), values, sentences
+
+
+def _describe_interface_patches(friction_model) -> "tuple[of_rig.Chain, list[str]]":
+    """Return the stiffnesses in series [N/m] of the interfaces of a rig that have a patch, and sentences on their slip."""
+    chain = {}
+    sentences = []
+    for number, interface in enumerate(friction_model.interfaces):
+        if interface.patch is None:
+            continue
+        for name, link in patch_plan.stiffness_chain(interface.patch).items():
+            if link != "rigid":
+                chain[add_interface_number(name, number)] = link
+
+        # The whole patch slips when its pieces are sheared by mu_s N/k.
+        slip_force = interface.numbers.static * interface.load
+        slip_length = slip_force / interface.patch.pieces.shear_stiffness
+        name = friction_model.names[number]
+        sentences.append(patch_plan.describe_shear(interface.patch, slip_length, name))
+    return chain, sentences
 
 
 def _find_law_stiffnesses(model: Model) -> "of_rig.Chain":

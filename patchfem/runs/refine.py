@@ -4,8 +4,10 @@ In: a function that solves a problem with a resolution, and one that judges the 
 the resolution along the axis that causes the errors of a measure (`find_refinable_axis`): the meshes of the patches or the
 steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_refined`). A run that would not meet its tolerance within
 accuracy.max_seconds, or whose next mesh would exceed accuracy.max_memory, is not repeated; its result names the axis and the
-time or memory that would be needed. The meshes of a patch (`patch.mesh_levels`) and of a group of patches
-(`patch.case_meshes`) are refined by the same loop. Curves, backbones and fits have loops of their own.
+time or memory that would be needed. The same loop refines the meshes of a patch (`patch.mesh_levels`), its points
+(`patch.profile_points`) or cells (`patch.area`), and the meshes of a group of patches (`patch.case_meshes`). Cases of a
+sweep at one point (`batch.lumped`) and fits (`campaigns.fits.problem`) have loops of their own, in which only some cases go
+on, or the model changes between two fits.
 """
 
 from collections.abc import Callable, Hashable, Iterable
@@ -89,6 +91,20 @@ class RunLimit(NamedTuple):
     begin: float
     clock: Callable[[], float] = measure_cpu_time
     bytes: float = DEFAULT_MAX_BYTES
+
+
+class RunControl(NamedTuple):
+    """What the caller of a run has set.
+
+    - limit: CPU time and memory that all passes together may take.
+    - say, progress: callbacks for a line of text and for the completed fraction, or None.
+    - estimate: whether to estimate the errors from coarser runs.
+    """
+
+    limit: RunLimit
+    say: Callable[[str], None] | None = None
+    progress: Callable[[float], None] | None = None
+    estimate: bool = True
 
 
 # of meshes, which have a largest predicted time of their own

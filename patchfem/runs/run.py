@@ -105,10 +105,11 @@ def run(
             store.clear_cache()
 
         start = process_time()
-        passes = _Passes(runnable, say, progress, state_file, estimate=estimate)
-        done, shortage = refine.refine(
-            passes.solve, runnable.model, passes.judge, passes.limit, say
-        )
+        max_seconds = runnable.model.accuracy.max_seconds or refine.DEFAULT_MAX_SECONDS
+        max_bytes = runnable.model.accuracy.max_memory or refine.DEFAULT_MAX_BYTES
+        limit = refine.RunLimit(max_seconds, measure_cpu_time(), bytes=max_bytes)
+        passes = _Passes(runnable, refine.RunControl(limit, say, progress, estimate), state_file)
+        done, shortage = refine.refine(passes.solve, runnable.model, passes.judge, limit, say)
         if shortage is not None:
             done = done._replace(result=replace(done.result, shortage=shortage))
         done.result.seconds["total"] = process_time() - start
@@ -122,36 +123,23 @@ class _Passes:
     ----------
     run_plan : Plan
         Plan of the first pass.
-    say : callable or None
-        Called with each line of text on what the run does.
-    progress : callable or None
-        Called with the completed fraction of the run [1].
+    control : RunControl
+        Limits of all passes together, callbacks, and whether to estimate the errors of the measures.
     state_file : StateFile or None
         File to which a long run saves its state; None to save nothing.
-    estimate : bool
-        Whether to estimate the errors of the measures from coarser runs.
-
-    Attributes
-    ----------
-    limit : RunLimit
-        CPU time that all passes together may take, and memory.
     """
 
-    def __init__(self, run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate):
+    def __init__(self, run_plan: Plan, control: refine.RunControl, state_file: StateFile | None):
         self.plan = run_plan
-        self.say = say
-        self.progress = progress
+        self.control = control
         self.state_file = state_file
-        self.estimate = estimate
-        max_seconds = run_plan.model.accuracy.max_seconds or refine.DEFAULT_MAX_SECONDS
-        max_bytes = run_plan.model.accuracy.max_memory or refine.DEFAULT_MAX_BYTES
-        self.limit = refine.RunLimit(max_seconds, measure_cpu_time(), bytes=max_bytes)
         self._count = 0
         self._pressed: tuple[Face, ...] = ()
 
     def solve(self, model: Model, earlier: FinishedPass | None) -> FinishedPass | None:
         """Run a model after an earlier pass, None for the first one; return None if it cannot improve the earlier pass."""
-        begin = self.limit.clock()
+        clock = self.control.limit.clock
+        begin = clock()
         seconds = {}
         try:
             result, pressed = self._run_model(model, seconds)
@@ -167,7 +155,7 @@ class _Passes:
             bounded = refine.bound_errors(result.measures, earlier.result.measures)
             result = replace(result, measures=bounded)
         self._count += 1
-        return FinishedPass(model, result, pressed, self.limit.clock() - begin)
+        return FinishedPass(model, result, pressed, clock() - begin)
 
     def judge(self, done: FinishedPass, excesses: list[float]) -> refine.Verdict:
         """Decide whether a pass is followed by another one.
@@ -179,7 +167,7 @@ class _Passes:
         excesses : list of float
             Ratios of error to allowed error of the passes before.
         """
-        if not self.estimate:
+        if not self.control.estimate:
             return refine.Verdict(0.0)
         return refine.judge_pass(self.plan.model, done, excesses)
 
@@ -190,6 +178,7 @@ class _Passes:
         meshes of the pass before are not solved again.
         """
         start = process_time()
+        estimate = self.control.estimate
         if model.has_interface_patches:
             model = joint.press_interfaces(model)
         warnings = list(model.source.remarks)
@@ -197,7 +186,7 @@ class _Passes:
         if model.rig is not None:
             warnings += engines.describe_unused_settings(model, self.plan.engine)
 
-        pressed = _press_interfaces(model, self._pressed, estimate=self.estimate)
+        pressed = _press_interfaces(model, self._pressed, estimate=estimate)
         if pressed:
             seconds["contact"] = process_time() - start
         stiffer = None
@@ -208,7 +197,7 @@ class _Passes:
 
         # Sentences on the static contact; those of several interfaces are merged.
         if pressed:
-            warn = partial(_warn_of_pressed_patch, estimate=self.estimate)
+            warn = partial(_warn_of_pressed_patch, estimate=estimate)
             warnings += merge_sentences(model, pressed, warn)
             notes += merge_sentences(model, pressed, patch_result.notes_on_neglected_effects)
         notes += model.describe_removed_joint()
@@ -218,10 +207,7 @@ class _Passes:
             seconds=seconds,
             warnings=warnings,
             notes=notes,
-            limit=self.limit,
-            say=self.say,
-            progress=self.progress,
-            estimate=self.estimate,
+            control=self.control,
             stiffer=stiffer,
         )
 
@@ -266,7 +252,7 @@ class _Passes:
             result = area_motion.add_reversal_measure(result, moved.coarse)
         if model.wear is not None:
             result = replace(result, plan=run_plan)
-            result = measures.add_wear_measures(result, worn_patch, self.estimate)
+            result = measures.add_wear_measures(result, worn_patch, self.control.estimate)
         return result, moved.faces
 
     def _wear_patch(self, inputs: RunInputs) -> "evolve.WornPatch":
@@ -274,12 +260,13 @@ class _Passes:
         model = inputs.plan.model
         patch, *coarse = inputs.patches[:3]
         file = self.state_file
+        progress = inputs.control.progress
         if file is None:
-            return evolve.compute_wear(model, patch, coarse, inputs.progress)
+            return evolve.compute_wear(model, patch, coarse, progress)
         key = hash_run(model, patch, file.version)
         initial = evolve.load_wear_state(file.path, key) if file.resume else None
         store = partial(evolve.save_wear_state, file.path, key)
-        return evolve.compute_wear(model, patch, coarse, inputs.progress, initial, store)
+        return evolve.compute_wear(model, patch, coarse, progress, initial, store)
 
     def _saving_context(self, run_plan: Plan, patch):
         """Return a context in which marches save their states; one that does nothing without them.
@@ -389,14 +376,15 @@ def _make_worn_inputs(inputs: RunInputs, worn_patch: "evolve.WornPatch") -> RunI
         stiffer = stiffer._replace(model=wear_model(stiffer.model), patches=[worn_patch.patch])
     (face,) = inputs.faces
     worn = (worn_patch.patch, *worn_patch.coarse)
+    # The time of the wear, which has passes of its own, is not that of the motion.
+    limit = inputs.control.limit
+    limit = limit._replace(begin=limit.clock())
     return replace(
         inputs,
         plan=replace(inputs.plan, model=wear_model(inputs.plan.model)),
         faces=(face._replace(patches=worn, unworn=face.patches),),
-        progress=None,
+        control=inputs.control._replace(limit=limit, progress=None),
         stiffer=stiffer,
-        # The time of the wear, which has passes of its own, is not that of the motion.
-        limit=inputs.limit._replace(begin=inputs.limit.clock()),
     )
 
 

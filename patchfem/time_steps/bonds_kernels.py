@@ -28,7 +28,23 @@ MIN_LENGTH = 1e-9  # smallest bond length of the LuGre law relative to that at r
 
 @njit(**NJIT_CALL)
 def slide_bonds(numbers, memory, trial, values, count, step):
-    """Slide a block of points of bonds; the package describes the arguments (`time_steps`)."""
+    """Slide a block of points of bonds, whose rows are those of `BondRow`.
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
+    """
     # Bonds under a constant load and of a constant length need only the last loops.
     has_changes = 0.0
     longest = 0.0
@@ -96,7 +112,17 @@ def move_bonds(numbers, trial, values, j, shapes):
 
 @njit(**NJIT_CALL)
 def find_length(numbers, j, velocity):
-    """Return the bond length [m] of point j at a velocity [m/s], which is constant for Dahl and nonlocal bonds."""
+    """Return the bond length [m] of a point, which is constant for Dahl and nonlocal bonds.
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Rows of `BondRow`.
+    j : int
+        Number of the point.
+    velocity : float
+        Velocity of the point [m/s].
+    """
     length = numbers[BondRow.LENGTH + j]
     ratio = velocity / numbers[BondRow.SPEED + j]
     kinetic = numbers[BondRow.KINETIC + j] / numbers[BondRow.FRICTION + j]
@@ -107,7 +133,20 @@ def find_length(numbers, j, velocity):
 def prepare_bonds(numbers, memory, trial, values, count, step):
     """Let the first half of the change of load act, and set the bond length in the middle of the step.
 
-    The arguments are those of `slide_bonds`; `trial` has the memory, and is changed.
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the start of the step; changed.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
     """
     for j in range(count):
         start = values[Value.START_LOAD + j]
@@ -194,7 +233,20 @@ def press_bonds(numbers, trial, j, before, after):
 def finish_bonds(numbers, memory, trial, values, count, step):
     """Let the second half of the change of load act, grow the bonds and add the damping of the LuGre law.
 
-    The arguments are those of `slide_bonds`; `trial` has the moments at the end of the slide, and is changed.
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        Moments at the end of the slide; changed.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
     """
     for j in range(count):
         stop = values[Value.END_LOAD + j]

@@ -7,7 +7,7 @@ changes along the path. A rising load gives the end of a step no more energy tha
 
 from math import exp, sqrt
 
-from ..friction.laws.bouc_wen_kernels import FollowedPath, follow_path
+from ..friction.laws.bouc_wen_kernels import follow_path
 from ..kernel_cache.flags_kernels import NJIT_CALL
 from ..kernel_cache.jit import njit
 from .step_rows_kernels import WIDTH, Value
@@ -70,9 +70,24 @@ def find_start(force, move, load, middle):
 
 @njit(**NJIT_CALL)
 def slide_bouc_wen(numbers, memory, trial, values, count, step):
-    """Slide a block of points of the Bouc-Wen law; the package describes the arguments (`time_steps`).
+    """Slide a block of points of the Bouc-Wen law.
 
     Rows of `numbers`: coefficient of friction, length [m], exponent, shape. Memory: y [N], load of the springs [N].
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
     """
     for j in range(count):
         friction = numbers[j]
@@ -94,37 +109,41 @@ def slide_bouc_wen(numbers, memory, trial, values, count, step):
         # reduces faster than the load falls is never cut, so that its part beyond the limit is carried along.
         direction = 1.0 if slide > 0 else -1.0
         first_springs = max(memory[WIDTH + j], middle)
-        slips = find_slip(direction * memory[j] / middle, exponent, numbers[3 * WIDTH + j])
-        springs = break_springs(first_springs, middle, 0.5 * slips * abs(slide) / length)
+        springs = middle
+        if first_springs > middle:
+            slips = find_slip(direction * memory[j] / middle, exponent, numbers[3 * WIDTH + j])
+            springs = break_springs(first_springs, middle, 0.5 * slips * abs(slide) / length)
         path = abs(slide) * springs / (length * middle)
         unloading = 2 * numbers[3 * WIDTH + j] * path * middle  # of a force at its limit
         start = find_start(direction * memory[j], unloading, load, middle)
         y = max(start / middle, -1.0)
-        beyond = (start / middle - y) * exp(-path)
+        beyond = start / middle - y
+        if beyond < 0:
+            beyond *= exp(-path)
         energy = 0.5 * length * start * start / first_springs
         moved = follow_path(y, path, exponent, numbers[3 * WIDTH + j])
         slipped = max(path - (moved.end - y), 0.0) * middle / springs
-        moved = FollowedPath(moved.end + beyond, moved.mean + beyond)
-        mean = moved.mean if path > 0 else start / middle
+        reduced = moved.end + beyond
+        mean = moved.mean + beyond if path > 0 else start / middle
         work = energy + middle * mean * abs(slide)
-        rate = springs / length * (1 - find_slip(moved.end, exponent, numbers[3 * WIDTH + j]))
+        rate = springs / length * moved.slope
 
         # Springs beyond the load break over the part of the path that slips.
         left = break_springs(first_springs, middle, slipped)
         left = max(left, load) if load > 0 else 0.0
 
         # Second half of the change of load
-        stop = middle * moved.end
+        stop = middle * reduced
         last = min(max(stop, -load), load)
-        if stop > 0 and slide != 0:
+        if stop > 0 and slide != 0 and load != middle:
             # Under a load that is linear in the path, the deviation of y relaxes at the rate r per path of the step. Its end
             # then deviates from that under the mean load by y/N (1 + exp(-r) - 2 (1 - exp(-r))/r) of half the change.
-            relaxation = exponent * moved.end ** (exponent - 1) * path
+            relaxation = exponent * (1 - moved.slope) / reduced * path
             share = relaxation * relaxation / 6
             if relaxation > MIN_RELAXATION:
                 decay = exp(-relaxation)
                 share = 1 + decay - 2 * (1 - decay) / relaxation
-            last = min(stop + moved.end * share * (load - middle), load)
+            last = min(stop + reduced * share * (load - middle), load)
         # Friction under a constant load may return more than this energy as it unloads: no bound below its own end
         most = max(sqrt(2 * max(work, 0.0) * left / length), abs(stop))
         last = min(max(last, -most), most)
@@ -135,7 +154,7 @@ def slide_bouc_wen(numbers, memory, trial, values, count, step):
         values[Value.END_BY_SLIDE + j] = friction * rate if abs(stop) <= load else 0.0
         slope = 0.5 * rate
         if path > MIN_PATH:
-            slope = middle * (moved.end - mean) / abs(slide)
+            slope = middle * (reduced - mean) / abs(slide)
         values[Value.MEAN_BY_SLIDE + j] = friction * slope
         stretch = direction * last * length / left if left > 0 else 0.0
         values[Value.ENERGY + j] = 0.5 * friction * direction * last * stretch

@@ -13,9 +13,24 @@ from .tanh_kernels import slide_tanh
 
 @njit(**NJIT_CALL)
 def slide_points(law, numbers, memory, trial, values, count, step):
-    """Slide a block of points of a law; the package describes the arguments (`time_steps`).
+    """Slide a block of points of a law. A point of rigid friction (`Law.COULOMB`) is solved with its port.
 
-    A point of rigid friction (`Law.COULOMB`) is solved with its port.
+    Parameters
+    ----------
+    law : Law
+        Number of the law.
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
     """
     if law == Law.CELLS:
         slide_cells(numbers, memory, trial, values, count, step)
@@ -37,5 +52,23 @@ def slide_points(law, numbers, memory, trial, values, count, step):
 
 @njit(**NJIT_KERNEL)
 def slide_law(law, numbers, memory, trial, values, count, step):
-    """Slide a block of points as `slide_points`, for calls from Python."""
+    """Slide a block of points of a law, for calls from Python.
+
+    Parameters
+    ----------
+    law : Law
+        Number of the law.
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
+    """
     slide_points(law, numbers, memory, trial, values, count, step)

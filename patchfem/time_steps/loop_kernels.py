@@ -173,7 +173,7 @@ def write_sample(system, row, sample):
         sample[k] = state[k]
     if system.options.has_events:
         for p in range(ports.values.shape[1]):
-            ports.vector[p] = steps.sum_forces(system, p)
+            ports.newton.residual[p] = steps.sum_forces(system, p)
         normal.find_holds(system, state, structure.drive[row, 0])
 
     for p in range(ports.values.shape[1]):
@@ -184,8 +184,8 @@ def write_sample(system, row, sample):
 
     # Stored energy of pieces, points and grooves
     energy = 0.0
-    for k in range(points.stiffness.size):
-        energy += 0.5 * points.stiffness[k] * points.shear[Shear.VALUE, k] ** 2
+    for k in range(points.pieces.stiffness.size):
+        energy += 0.5 * points.pieces.stiffness[k] * points.pieces.shear[Shear.VALUE, k] ** 2
     sample[size + Sample.ENERGY] = energy
     sample[size + Sample.SPRINGS] = 0.0
     sample[size + Sample.LOAD] = structure.loads[row] if structure.loads.size else 0.0
@@ -229,7 +229,7 @@ def march(system, n_steps, samples):
         Status, as defined in `march_rows_kernels`.
     """
     size = system.state.shape[1]
-    ticks = 1 << (system.structure.responses.shape[0] - 1)
+    ticks = 1 << (system.structure.responses.motion.shape[0] - 1)
     dt = system.options.step
     first_column = size + Sample.PORTS + 2
     level = 0

@@ -74,6 +74,8 @@ MAX_STALLS = 4  # iterations that do not halve the smallest residual, after whic
 # Largest residual of such a step relative to RESIDUAL, and that of lists, whose means have quadrature errors
 STALLED = 1e3
 LISTS_STALLED = 1e5
+# Residual of lists relative to RESIDUAL: 1e-9 of the force, below the errors by which strips are joined
+LISTS_RESIDUAL = 1e3
 LIST_CUTS = 30  # trials of a line search for lists
 LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
@@ -101,10 +103,10 @@ def place_block(system, block, move, velocity, step):
     """
     points = system.points
     values = points.values[block]
-    port = points.port[block]
+    port = points.blocks.port[block]
     n_lanes = count_lanes(points, block)
-    start = points.shears[port, 0]
-    stop = points.shears[port, 1]
+    start = points.pieces.shears[port, 0]
+    stop = points.pieces.shears[port, 1]
     for j in range(n_lanes):
         values[Value.BENT + j] = 0.0
         values[Value.SLIDE + j] = move
@@ -115,8 +117,8 @@ def place_block(system, block, move, velocity, step):
     # The pieces take a part of the increment by shear.
     at = WIDTH * block
     for k in range(start, stop):
-        shape = points.shapes[k]
-        increment = points.shear[Shear.TRIAL, k]
+        shape = points.pieces.shapes[k]
+        increment = points.pieces.shear[Shear.TRIAL, k]
         for j in range(n_lanes):
             values[Value.BENT + j] += shape[at + j] * increment
     for j in range(n_lanes):
@@ -141,10 +143,10 @@ def slide_block(system, block, step):
     points = system.points
     values = points.values[block]
     numbers = points.numbers[block]
-    count = points.count[block]
-    law = points.law[block]
+    count = points.blocks.count[block]
+    law = points.blocks.law[block]
     if law == Law.LIST:
-        lists.slide_lists(system.lists, numbers, values, count, step)
+        lists.slide_lists(system.points.lists, numbers, values, count, step)
     else:
         laws.slide_points(
             law, numbers, points.memory[block], points.trial[block], values, count, step
@@ -167,10 +169,10 @@ def weigh_block(points, block, damping, step):
         Formula of the velocity.
     """
     values = points.values[block]
-    port = points.port[block]
+    port = points.blocks.port[block]
     n_lanes = count_lanes(points, block)
     rest = 1 - damping
-    if points.shears[port, 0] == points.shears[port, 1]:
+    if points.pieces.shears[port, 0] == points.pieces.shears[port, 1]:
         for j in range(n_lanes):
             end = damping * values[Value.END + j]
             values[Value.FORCE + j] = end + rest * values[Value.MEAN + j]
@@ -182,7 +184,7 @@ def weigh_block(points, block, damping, step):
 
     # Behind pieces it is the path mean over the part that slides, and the mean of both ends over the part of the pieces.
     # Lists act on pieces by their path means, over both parts.
-    is_list = points.law[block] == Law.LIST
+    is_list = points.blocks.law[block] == Law.LIST
     for j in range(n_lanes):
         if is_list:
             values[Value.FORCE + j] = values[Value.MEAN + j]
@@ -245,7 +247,7 @@ def place_points(system, level, step):
         ratio = flank[Flank.RATIO] if flank.size and p == 0 else 1.0
         move = ratio * moves[Port.MOVE, p]
         velocity = ratio * moves[Port.END_VELOCITY, p]
-        for block in range(points.first[p], points.first[p + 1]):
+        for block in range(points.blocks.first[p], points.blocks.first[p + 1]):
             place_block(system, block, move, velocity, step)
 
 
@@ -275,7 +277,7 @@ def write_forces(system, level, step):
     flank = system.flank
     place_points(system, level, step)
     change = 0.0
-    has_places = points.pressure.size and not is_shortest(system, level)
+    has_places = points.loads.pressure.size and not is_shortest(system, level)
     if system.ports.contact[0] >= 0 or flank.size or has_places:
         change = find_loads(system, 0, 0.0, True)
         if change < 0:
@@ -285,8 +287,8 @@ def write_forces(system, level, step):
         force = 0.0
         by_slide = 0.0
         by_velocity = 0.0
-        for block in range(points.first[p], points.first[p + 1]):
-            if points.law[block] == Law.COULOMB:
+        for block in range(points.blocks.first[p], points.blocks.first[p + 1]):
+            if points.blocks.law[block] == Law.COULOMB:
                 force = slip_rigidly(system, p, block)
                 continue
             slide_block(system, block, step)
@@ -300,7 +302,7 @@ def write_forces(system, level, step):
 
     if flank.size:
         end = 0.0
-        for block in range(points.first[1]):
+        for block in range(points.blocks.first[1]):
             end += sum_points(points, block, Value.END)
         flanks.add_climb(flank, moves, moves[Port.MOVE, 0], step.duration, end)
         moves[Port.BY_VELOCITY, 0] *= flank[Flank.RATIO] ** 2
@@ -340,12 +342,12 @@ def slip_rigidly(system, p, block):
 def write_residual(system, level):
     """Compute the residuals [N] of port forces and shear coordinates; return the largest one over its tolerance.
 
-    `ports.vector` receives first the residuals of the ports, then those of the shear coordinates.
+    `ports.newton.residual` receives first the residuals of the ports, then those of the shear coordinates.
     """
     ports = system.ports
     points = system.points
     moves = ports.values
-    vector = ports.vector
+    vector = ports.newton.residual
     n_ports = moves.shape[1]
     size = system.options.scale
     for p in range(n_ports):
@@ -363,13 +365,13 @@ def write_residual(system, level):
     largest = find_port_residual(system, level, size)
 
     # kappa (b + db) = shapes^T f1, for lists kappa (b + db/2) = shapes^T mean
-    shear = points.shear
-    for k in range(points.stiffness.size):
+    shear = points.pieces.shear
+    for k in range(points.pieces.stiffness.size):
         weight = find_shear_weight(points, k)
         row = Value.END if weight == 1.0 else Value.MEAN
         residual = shear[Shear.VALUE, k] + weight * shear[Shear.TRIAL, k]
-        residual *= points.stiffness[k]
-        for block in range(points.bent[k, 0], points.bent[k, 1]):
+        residual *= points.pieces.stiffness[k]
+        for block in range(points.pieces.bent[k, 0], points.pieces.bent[k, 1]):
             residual -= sum_shape(points, k, block, row)
         vector[n_ports + k] = residual
         largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / (RESIDUAL * size))
@@ -379,18 +381,28 @@ def write_residual(system, level):
 @njit(**NJIT_CALL)
 def find_shear_weight(points, k):
     """Return the part of a step at whose end shear coordinate k is in equilibrium: 1, or 1/2 for lists."""
-    return 0.5 if points.law[points.bent[k, 0]] == Law.LIST else 1.0
+    return 0.5 if points.blocks.law[points.pieces.bent[k, 0]] == Law.LIST else 1.0
 
 
 @njit(**NJIT_CALL)
 def count_lanes(points, block):
     """Return the number of points of a block, rounded up to whole vectors."""
-    return (points.count[block] + VECTOR - 1) // VECTOR * VECTOR
+    return (points.blocks.count[block] + VECTOR - 1) // VECTOR * VECTOR
 
 
 @njit(**NJIT_CALL)
 def sum_points(points, block, row):
-    """Return the sum over a block of a row of `Value`."""
+    """Return the sum over the points of a block of one of their values.
+
+    Parameters
+    ----------
+    points : step_rows_kernels.Points
+        Points.
+    block : int
+        Number of the block.
+    row : Value
+        Row of the values.
+    """
     values = points.values[block]
     total = 0.0
     for j in range(count_lanes(points, block)):
@@ -413,7 +425,7 @@ def sum_shape(points, k, block, row):
     row : Value
         Row of the values.
     """
-    shape = points.shapes[k]
+    shape = points.pieces.shapes[k]
     values = points.values[block]
     at = WIDTH * block
     n_lanes = count_lanes(points, block)
@@ -425,7 +437,7 @@ def sum_shape(points, k, block, row):
 
 @njit(**NJIT_CALL)
 def write_matrix(system, level, step):
-    """Write the Jacobian of the residuals of a step to `ports.matrix`.
+    """Write the Jacobian of the residuals of a step to `ports.newton.matrix`.
 
     A force at port k reduces the increment of port p by C_pk and its velocity at the end of the step by G_pk.
 
@@ -441,16 +453,16 @@ def write_matrix(system, level, step):
     ports = system.ports
     points = system.points
     moves = ports.values
-    matrix = ports.matrix
+    matrix = ports.newton.matrix
     compliance = ports.compliance[level]
     n_ports = moves.shape[1]
     matrix[:] = 0.0
-    for k in range(points.stiffness.size):
-        matrix[n_ports + k, n_ports + k] = find_shear_weight(points, k) * points.stiffness[k]
+    for k in range(points.pieces.stiffness.size):
+        matrix[n_ports + k, n_ports + k] = find_shear_weight(points, k) * points.pieces.stiffness[k]
     for p in range(n_ports):
         damping = moves[Port.DAMPING, p]
-        start = points.shears[p, 0]
-        stop = points.shears[p, 1]
+        start = points.pieces.shears[p, 0]
+        stop = points.pieces.shears[p, 1]
         ratio = system.flank[Flank.RATIO] if system.flank.size and p == 0 else 1.0
         if start < stop:
             write_products(points, p, matrix, n_ports, step)
@@ -460,9 +472,9 @@ def write_matrix(system, level, step):
             v = compliance[1, p, k]
             matrix[p, k] = -moves[Port.BY_SLIDE, p] * move - moves[Port.BY_VELOCITY, p] * v
             for l in range(start, stop):
-                matrix[n_ports + l, k] += ratio * points.products[l, 0] * move
+                matrix[n_ports + l, k] += ratio * points.pieces.products[l, 0] * move
         for l in range(start, stop):
-            matrix[p, n_ports + l] = ratio * points.products[l, 1]
+            matrix[p, n_ports + l] = ratio * points.pieces.products[l, 1]
         matrix[p, p] -= 1.0
 
     if ports.contact[0] >= 0:
@@ -482,7 +494,7 @@ def write_products(points, p, matrix, n_ports, step):
     """Add the derivatives of the residuals of the shear coordinates of port p.
 
     Those by the coordinates are added to `matrix`; those by the increment of the port, and of the port force by the
-    coordinates, are written to `points.products`.
+    coordinates, are written to `points.pieces.products`.
 
     Parameters
     ----------
@@ -497,19 +509,19 @@ def write_products(points, p, matrix, n_ports, step):
     step : Step
         Formula of the velocity.
     """
-    start = points.shears[p, 0]
-    stop = points.shears[p, 1]
+    start = points.pieces.shears[p, 0]
+    stop = points.pieces.shears[p, 1]
     weight = find_shear_weight(points, start)
     by_slide_row = Value.END_BY_SLIDE if weight == 1.0 else Value.MEAN_BY_SLIDE
     for k in range(start, stop):
-        points.products[k, 0] = 0.0
-        points.products[k, 1] = 0.0
-    for block in range(points.first[p], points.first[p + 1]):
+        points.pieces.products[k, 0] = 0.0
+        points.pieces.products[k, 1] = 0.0
+    for block in range(points.blocks.first[p], points.blocks.first[p + 1]):
         values = points.values[block]
         at = WIDTH * block
         n_lanes = count_lanes(points, block)
         for k in range(start, stop):
-            shape = points.shapes[k]
+            shape = points.pieces.shapes[k]
             by_slide = 0.0
             by_shear = 0.0
             for j in range(n_lanes):
@@ -519,10 +531,10 @@ def write_products(points, p, matrix, n_ports, step):
                 values[Value.WEIGHTED + j] = weighted
                 by_slide += weighted
                 by_shear += shape[at + j] * values[Value.BY_SHEAR + j]
-            points.products[k, 0] += by_slide
-            points.products[k, 1] += by_shear
+            points.pieces.products[k, 0] += by_slide
+            points.pieces.products[k, 1] += by_shear
             for l in range(start, k + 1):
-                other = points.shapes[l]
+                other = points.pieces.shapes[l]
                 total = 0.0
                 for j in range(n_lanes):
                     total += other[at + j] * values[Value.WEIGHTED + j]
@@ -585,8 +597,9 @@ def solve_forces(system, level, step):
     has_lists = system.options.has_lists > 0
     has_potential = has_lists or (is_shortest(system, level) and not system.options.has_events)
     stalled = LISTS_STALLED if has_lists else STALLED
+    solved = LISTS_RESIDUAL if has_lists else 1.0
     for _ in range(MAX_NEWTON_ITERATIONS):
-        if residual <= 1.0 or (n_stalls >= MAX_STALLS and residual <= stalled):
+        if residual <= solved or (n_stalls >= MAX_STALLS and residual <= stalled):
             return True
         system.totals[Total.ITERATIONS] += 1
         if not find_newton_step(system, level, step):
@@ -609,7 +622,7 @@ def solve_forces(system, level, step):
             if change < 0:
                 return False
             residual = max(write_residual(system, level), change / LOAD_RESIDUAL)
-            if residual <= 1.0:
+            if residual <= solved:
                 break
             if has_potential:
                 slope = find_potential_slope(system, level)
@@ -627,7 +640,7 @@ def solve_forces(system, level, step):
 
 @njit(**NJIT_CALL)
 def find_newton_step(system, level, step):
-    """Write Newton's step to `ports.step`; return whether the Jacobian is regular.
+    """Write Newton's step to `ports.newton.step`; return whether the Jacobian is regular.
 
     Parameters
     ----------
@@ -640,9 +653,9 @@ def find_newton_step(system, level, step):
     """
     ports = system.ports
     write_matrix(system, level, step)
-    for i in range(ports.vector.size):
-        ports.step[i] = ports.vector[i]
-    return solve_linear(ports.matrix, ports.step, ports.vector.size)
+    for i in range(ports.newton.residual.size):
+        ports.newton.step[i] = ports.newton.residual[i]
+    return solve_linear(ports.newton.matrix, ports.newton.step, ports.newton.residual.size)
 
 
 @njit(**NJIT_CALL)
@@ -658,9 +671,9 @@ def find_potential_slope(system, level):
     slope = 0.0
     for p in range(n_ports):
         for k in range(n_ports):
-            slope += ports.vector[p] * compliance[0, p, k] * ports.step[k]
-    for k in range(n_ports, ports.vector.size):
-        slope -= ports.vector[k] * ports.step[k]
+            slope += ports.newton.residual[p] * compliance[0, p, k] * ports.newton.step[k]
+    for k in range(n_ports, ports.newton.residual.size):
+        slope -= ports.newton.residual[k] * ports.newton.step[k]
     return slope
 
 
@@ -671,12 +684,12 @@ def drop_negative_slopes(system):
     moves = system.ports.values
     for p in range(moves.shape[1]):
         moves[Port.BY_SLIDE, p] = 0.0
-        for block in range(points.first[p], points.first[p + 1]):
+        for block in range(points.blocks.first[p], points.blocks.first[p + 1]):
             values = points.values[block]
             for j in range(count_lanes(points, block)):
                 slope = max(values[Value.BY_SLIDE + j], 0.0)
                 values[Value.BY_SLIDE + j] = slope
-                if points.law[block] == Law.LIST:
+                if points.blocks.law[block] == Law.LIST:
                     values[Value.MEAN_BY_SLIDE + j] = slope
                     values[Value.BY_SHEAR + j] = -slope
             moves[Port.BY_SLIDE, p] += sum_points(points, block, Value.BY_SLIDE)
@@ -702,7 +715,7 @@ def find_loads(system, row, fraction, is_solved):
     ports = system.ports
     points = system.points
     if ports.contact[0] >= 0:
-        resultant = normal.find_resultant(system, points.nodal)
+        resultant = normal.find_resultant(system, points.loads.nodal)
         if resultant < 0:
             return -1.0
     else:
@@ -710,18 +723,18 @@ def find_loads(system, row, fraction, is_solved):
 
     change = 0.0
     total = TINY_LOAD
-    has_back = points.node.shape[1] > WIDTH
-    for block in range(points.law.size):
-        if points.is_spring[points.port[block]]:
+    has_back = points.loads.node.shape[1] > WIDTH
+    for block in range(points.blocks.law.size):
+        if points.blocks.is_spring[points.blocks.port[block]]:
             continue
         values = points.values[block]
-        for j in range(points.count[block]):
-            x = points.place[block, j] + values[Value.TOTAL + j] + values[Value.SLIDE + j]
+        for j in range(points.blocks.count[block]):
+            x = points.loads.place[block, j] + values[Value.TOTAL + j] + values[Value.SLIDE + j]
             load = find_point_load(points, (block, j), x, resultant)
             change = max(change, abs(load - values[Value.END_LOAD + j]))
             values[Value.END_LOAD + j] = load
             if has_back:
-                x += points.place[block, WIDTH + j] - points.place[block, j]
+                x += points.loads.place[block, WIDTH + j] - points.loads.place[block, j]
                 load = find_point_load(points, (block, WIDTH + j), x, resultant)
             values[Value.END_BACK + j] = load
             total += load
@@ -732,15 +745,15 @@ def find_loads(system, row, fraction, is_solved):
 @njit(**NJIT_CALL)
 def is_held(points, p):
     """Return whether port p is held at rest by its rigid point."""
-    block = points.first[p]
-    is_rigid = block < points.first[p + 1] and points.law[block] == Law.COULOMB
+    block = points.blocks.first[p]
+    is_rigid = block < points.blocks.first[p + 1] and points.blocks.law[block] == Law.COULOMB
     return is_rigid and points.memory[block, 0] == 0
 
 
 @njit(**NJIT_CALL)
 def is_shortest(system, level):
     """Return whether a step of this level cannot be halved."""
-    return level == system.structure.responses.shape[0] - 1
+    return level == system.structure.responses.motion.shape[0] - 1
 
 
 @njit(**NJIT_CALL)
@@ -764,10 +777,10 @@ def find_event(system, level, drive):
     is_last = is_shortest(system, level)
     is_found = False
     is_any_held = False
-    for block in range(points.law.size):
-        if points.law[block] != Law.COULOMB:
+    for block in range(points.blocks.law.size):
+        if points.blocks.law[block] != Law.COULOMB:
             continue
-        p = points.port[block]
+        p = points.blocks.port[block]
         direction = points.memory[block, 0]
         is_any_held = is_any_held or direction == 0
 
@@ -781,9 +794,9 @@ def find_event(system, level, drive):
         return True
 
     # Ports that creep stop with the port that has reversed, because one motion of the modes may move both.
-    for block in range(points.law.size if is_found else 0):
-        speed = points.memory[block, 0] * moves[Port.END_VELOCITY, points.port[block]]
-        if points.law[block] == Law.COULOMB and speed < find_creep(system, block):
+    for block in range(points.blocks.law.size if is_found else 0):
+        speed = points.memory[block, 0] * moves[Port.END_VELOCITY, points.blocks.port[block]]
+        if points.blocks.law[block] == Law.COULOMB and speed < find_creep(system, block):
             points.trial[block, 0] = 0.0
     return is_any_held and release_port(system, drive, is_last)
 
@@ -794,10 +807,10 @@ def gains_energy(system):
     points = system.points
     moves = system.ports.values
     for p in range(moves.shape[1]):
-        block = points.first[p]
-        if block < points.first[p + 1] and points.law[block] == Law.TANH:
+        block = points.blocks.first[p]
+        if block < points.blocks.first[p + 1] and points.blocks.law[block] == Law.TANH:
             force = moves[Port.FORCE, p]
-            if points.shears[p, 0] == points.shears[p, 1]:
+            if points.pieces.shears[p, 0] == points.pieces.shears[p, 1]:
                 size = max(abs(force), system.options.scale) * abs(moves[Port.INCREMENT, p])
                 if force * moves[Port.INCREMENT, p] < -RESIDUAL * size:
                     return True
@@ -811,7 +824,7 @@ def find_creep(system, block):
     Only ports that share their force with others creep. Any other port would rest again after a release, because a
     shortest step of a fine march gives it a smaller velocity.
     """
-    p = system.points.port[block]
+    p = system.points.blocks.port[block]
     if system.ports.redundant[p] == 0:
         return 0.0
     force = abs(system.points.values[block, Value.FORCE])
@@ -837,19 +850,19 @@ def release_port(system, drive, is_last):
     ports = system.ports
     # Row 2 of the state is that at the end of the trial step, and so are the forces of the points.
     for p in range(ports.values.shape[1]):
-        ports.vector[p] = 0.0
-        for block in range(points.first[p], points.first[p + 1]):
-            if points.law[block] == Law.COULOMB:
-                ports.vector[p] += find_rigid_force(points, block)
+        ports.newton.residual[p] = 0.0
+        for block in range(points.blocks.first[p], points.blocks.first[p + 1]):
+            if points.blocks.law[block] == Law.COULOMB:
+                ports.newton.residual[p] += find_rigid_force(points, block)
             else:
-                ports.vector[p] += sum_points(points, block, Value.END)
+                ports.newton.residual[p] += sum_points(points, block, Value.END)
     normal.find_holds(system, system.state[2], drive)
     worst = -1
     largest = 1.0
     for p in range(ports.values.shape[1]):
         if ports.values[Port.HELD, p] == 0:
             continue
-        block = points.first[p]
+        block = points.blocks.first[p]
         hold = ports.values[Port.HOLD, p]
         limit = points.numbers[block, 0] * pick_load(points.values[block], Value.END_LOAD, hold)
         hold = abs(hold)
@@ -859,7 +872,7 @@ def release_port(system, drive, is_last):
     if worst < 0:
         return False
     if is_last:
-        points.trial[points.first[worst], 0] = np.sign(ports.values[Port.HOLD, worst])
+        points.trial[points.blocks.first[worst], 0] = np.sign(ports.values[Port.HOLD, worst])
     return not is_last
 
 
@@ -879,7 +892,7 @@ def store_end(points, block):
         values[Value.START_LOAD + j] = values[Value.END_LOAD + j]
         values[Value.START_BACK + j] = values[Value.END_BACK + j]
         values[Value.START + j] = values[Value.END + j]
-    for k in range(points.n_memory[block]):
+    for k in range(points.blocks.n_memory[block]):
         points.memory[block, k] = points.trial[block, k]
 
 
@@ -893,19 +906,21 @@ def commit(system, duration):
     points = system.points
     moves = system.ports.values
     rest = 0.0
-    for block in range(points.law.size):
+    for block in range(points.blocks.law.size):
         values = points.values[block]
-        if points.law[block] == Law.COULOMB:
+        if points.blocks.law[block] == Law.COULOMB:
             # A port that was at rest before stays at its place.
-            p = points.port[block]
+            p = points.blocks.port[block]
             was_held = moves[Port.HELD, p] > 0 and points.trial[block, 0] == 0
             moves[Port.RETURN, p] = moves[Port.INCREMENT, p] if was_held else 0.0
             values[Value.SLIDE] = moves[Port.INCREMENT, p] - moves[Port.RETURN, p]
             rest += moves[Port.FORCE, p] * moves[Port.RETURN, p]
             values[Value.END] = find_rigid_force(points, block)
-        elif points.law[block] == Law.LIST:
+        elif points.blocks.law[block] == Law.LIST:
             numbers = points.numbers[block]
-            lists.advance_lists(system.lists, numbers, values, points.count[block], duration)
+            lists.advance_lists(
+                system.points.lists, numbers, values, points.blocks.count[block], duration
+            )
         n_lanes = count_lanes(points, block)
         for j in range(n_lanes):
             values[Value.TOTAL + j] += values[Value.SLIDE + j]
@@ -915,7 +930,7 @@ def commit(system, duration):
 
     system.totals[Total.REST] = rest
     advance_shear(points, duration)
-    points.clock[0] = duration
+    points.pieces.clock[0] = duration
     for p in range(moves.shape[1]):
         moves[Port.FIRST, p] = moves[Port.EARLIER, p]
         moves[Port.EARLIER, p] = moves[Port.LAST, p]
@@ -945,12 +960,12 @@ def find_order(system):
     """
     points = system.points
     moves = system.ports.values
-    shear = points.shear
+    shear = points.pieces.shear
     weight = 1.0
     for p in range(moves.shape[1]):
-        block = points.first[p]
-        is_tanh = block < points.first[p + 1] and points.law[block] == Law.TANH
-        if not is_tanh or points.shears[p, 0] == points.shears[p, 1]:
+        block = points.blocks.first[p]
+        is_tanh = block < points.blocks.first[p + 1] and points.blocks.law[block] == Law.TANH
+        if not is_tanh or points.pieces.shears[p, 0] == points.pieces.shears[p, 1]:
             continue
         change = 0.5 * (moves[Port.FREE_VELOCITY, p] - moves[Port.VELOCITY, p])
         change /= points.numbers[block, WIDTH]
@@ -958,7 +973,7 @@ def find_order(system):
 
         jump = 0.0
         size = 0.0
-        for k in range(points.shears[p, 0], points.shears[p, 1]):
+        for k in range(points.pieces.shears[p, 0], points.pieces.shears[p, 1]):
             last = shear[Shear.LAST, k] / shear[Shear.SCALE, k]
             earlier = shear[Shear.EARLIER, k] / shear[Shear.SCALE, k]
             jump += abs(last - earlier)
@@ -987,11 +1002,11 @@ def add_work(system, sample, first_column, part):
     moves = system.ports.values
     work = 0.0
     for p in range(moves.shape[1]):
-        if points.first[p] == points.first[p + 1] or points.is_spring[p]:
+        if points.blocks.first[p] == points.blocks.first[p + 1] or points.blocks.is_spring[p]:
             continue
         slide = moves[Port.INCREMENT, p]
         # Rigid friction at rest does no work: the port was moved back.
-        if points.law[points.first[p]] == Law.COULOMB:
+        if points.blocks.law[points.blocks.first[p]] == Law.COULOMB:
             slide -= moves[Port.RETURN, p]
         work += moves[Port.FORCE, p] * slide
         sample[first_column + N_PORT_COLUMNS * p] += moves[Port.FORCE, p] * part
@@ -1019,12 +1034,12 @@ def solve_step(system, level, row, end):
     find_damping(system, level)
     if system.structure.path.size:
         # A prescribed slide has a constant velocity in each step.
-        for block in range(points.law.size):
-            for j in range(points.count[block]):
+        for block in range(points.blocks.law.size):
+            for j in range(points.blocks.count[block]):
                 points.values[block, Value.START_VELOCITY + j] = moves[Port.VELOCITY, 0]
 
     # Velocity of order 2 from two increments (BDF2), of order 1 in the first step
-    last = points.clock[0]
+    last = points.pieces.clock[0]
     ratio = duration / last if last > 0 else 0.0
     part = find_order(system) * ratio / (1 + ratio)
     step = Step(duration, (1 + part) / duration, part * ratio / duration)
@@ -1033,10 +1048,10 @@ def solve_step(system, level, row, end):
     for p in range(moves.shape[1]):
         force = 3 * (moves[Port.LAST, p] - moves[Port.EARLIER, p]) + moves[Port.FIRST, p]
         moves[Port.FORCE, p] = force
-    if points.pressure.size and is_shortest(system, level):
+    if points.loads.pressure.size and is_shortest(system, level):
         # The pressure at the places where the step begins
-        for block in range(points.law.size):
-            for j in range(points.count[block]):
+        for block in range(points.blocks.law.size):
+            for j in range(points.blocks.count[block]):
                 points.values[block, Value.SLIDE + j] = 0.0
         find_loads(system, row, end, False)
     elif system.options.has_loads and system.structure.loads.size:
@@ -1049,7 +1064,7 @@ def sum_forces(system, p):
     """Return the friction force [N] of the points of port p at the end of the last step."""
     points = system.points
     total = 0.0
-    for block in range(points.first[p], points.first[p + 1]):
+    for block in range(points.blocks.first[p], points.blocks.first[p + 1]):
         total += sum_points(points, block, Value.START)
     return total
 
@@ -1061,14 +1076,14 @@ def press_at_rest(system):
     if system.ports.contact[0] >= 0:
         find_loads(system, 0, 0.0, False)
     step = Step(0.0, 0.0, 0.0)
-    for block in range(points.law.size):
+    for block in range(points.blocks.law.size):
         values = points.values[block]
-        for j in range(points.count[block]):
+        for j in range(points.blocks.count[block]):
             values[Value.SLIDE + j] = 0.0
-        if points.law[block] == Law.COULOMB:
+        if points.blocks.law[block] == Law.COULOMB:
             load = pick_load(values, Value.END_LOAD, points.memory[block, 0])
             values[Value.END] = points.numbers[block, WIDTH] * load * points.memory[block, 0]
-        elif points.law[block] != Law.LIST:
+        elif points.blocks.law[block] != Law.LIST:
             slide_block(system, block, step)
         store_end(points, block)
 
@@ -1094,7 +1109,7 @@ def write_ports(system, sample):
         slip = 0.0
         weights = 0.0
         stored = 0.0
-        for block in range(points.first[p], points.first[p + 1]):
+        for block in range(points.blocks.first[p], points.blocks.first[p + 1]):
             values = points.values[block]
             numbers = points.numbers[block]
             n_lanes = count_lanes(points, block)
@@ -1113,7 +1128,7 @@ def write_ports(system, sample):
         # A port whose points are all without load does not stick at all.
         sample[column + 1] = slip / weights if weights > 0 else ports.values[Port.SLIDE, p]
         row = Sample.ENERGY
-        if points.is_spring[p]:
+        if points.blocks.is_spring[p]:
             row = Sample.SPRINGS
             sample[column + 1] = 0.0
         sample[size + row] += stored

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact.set_arrays import SetArrays
-from ..friction.bonds.strip_rows_kernels import BondLists
 from .step_rows_kernels import Points
 
 # Statuses of a march
@@ -62,7 +61,7 @@ class Port(IntEnum):
 
 
 class Shear(IntEnum):
-    """Rows of `Points.shear`.
+    """Rows of `Pieces.shear`.
 
     - VALUE: coordinates [m]
     - LAST, EARLIER, FIRST: their mean rates in the last three steps [m/s], the last one first
@@ -155,6 +154,14 @@ class Sample(IntEnum):
 N_PORT_COLUMNS = 3  # force, slip and mean force of the following step
 
 
+class Newton(NamedTuple):
+    """Jacobian (P + r, P + r), residuals and step (P + r,) of Newton's method for P port forces and r shear coordinates."""
+
+    matrix: np.ndarray
+    residual: np.ndarray
+    step: np.ndarray
+
+
 class Ports(NamedTuple):
     """P ports on n modes.
 
@@ -164,8 +171,7 @@ class Ports(NamedTuple):
     - grip (P, P): acceleration of a port that a force on another port takes away [1/kg]
     - redundant (P,): compliance of a port at rest relative to its own, which determines the forces of more ports than modes
     - values (20, P): see `Port`
-    - matrix (P + r, P + r), vector, step (P + r,): Jacobian, residuals and step of Newton's method for P port forces and r
-      shear coordinates
+    - newton: workspace of Newton's method
     - contact (11,): numbers of the heave and pitch ports (-1 for none), then the results of `path_mean` in the order of
       `contact.set_arrays.PathMean`: slopes of the contact energy by heave [N] and pitch [N m], and their derivatives
     """
@@ -175,30 +181,39 @@ class Ports(NamedTuple):
     grip: np.ndarray
     redundant: np.ndarray
     values: np.ndarray
-    matrix: np.ndarray
-    vector: np.ndarray
-    step: np.ndarray
+    newton: Newton
     contact: np.ndarray
+
+
+class Responses(NamedTuple):
+    """Motion, viscous loss and work of the drive in steps of several lengths.
+
+    There are N = 3 n + 3 inputs: 2 n coordinates and velocities, the drive with two derivatives, and n constant modal forces
+    over mass.
+
+    - motion: (levels, 2 n, N) motion at the end of a step per input
+    - loss: (levels, N, N) viscous loss [J] as a quadratic form of the inputs
+    - work: (levels, 3, N) work of the drive [J] as a bilinear form of the drive and the inputs
+    """
+
+    motion: np.ndarray
+    loss: np.ndarray
+    work: np.ndarray
 
 
 class Structure(NamedTuple):
     """Modes in steps of several lengths.
 
-    - responses (levels, 2 n, N): motion at the end of a step per state, parabola of the drive and constant modal force over
-      mass, N = 3 n + 3
-    - loss (levels, N, N), work (levels, 3, N): viscous loss [J] as a quadratic form of these inputs, and work of the drive
-      as a bilinear form of the parabola and the inputs
+    - responses: motion and energies of steps of several lengths
     - modes (3, n): squared frequencies, participations of drive and output
     - damping (n, n): [1/s]
     - drive (s, 3): value, slope and second derivative of the drive at the start of every step
     - loads (s + 1,): prescribed load [N] at the steps, or (0,)
     - path (s + 1,): prescribed displacement [m] of port 0 at the steps, or (0,)
-    - inputs (N,): workspace
+    - inputs (3 n + 3,): workspace, the inputs of `responses`
     """
 
-    responses: np.ndarray
-    loss: np.ndarray
-    work: np.ndarray
+    responses: Responses
     modes: np.ndarray
     damping: np.ndarray
     drive: np.ndarray
@@ -228,7 +243,7 @@ class System(NamedTuple):
     """All arrays of a march.
 
     - structure: modes in steps of several lengths
-    - ports, points, lists: places where forces act on the modes, contact points at them, and their lists of bonds
+    - ports, points: places where forces act on the modes, and contact points at them
     - flank: grooves, see `Flank`, or (0,) without grooves
     - sets: contact sets of a patch
     - state (3, 2 n): modal coordinates and velocities, with row 0 at the start of a step, row 1 at its end without
@@ -240,7 +255,6 @@ class System(NamedTuple):
     structure: Structure
     ports: Ports
     points: Points
-    lists: BondLists
     flank: np.ndarray
     sets: SetArrays
     state: np.ndarray

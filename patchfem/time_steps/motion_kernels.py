@@ -86,7 +86,7 @@ def move_freely(system, level, drive, row, fraction):
     fraction : float
         Time at the start of the step, as a fraction of the whole step.
     """
-    response = system.structure.responses[level]
+    response = system.structure.responses.motion[level]
     state = system.state
     size = state.shape[1]
     n = size // 2
@@ -126,7 +126,7 @@ def write_trial(system, level):
     Modes are linear, so it is that without forces plus the responses to the modal forces, which complete the inputs of
     the step (`Structure.inputs`).
     """
-    response = system.structure.responses[level]
+    response = system.structure.responses.motion[level]
     inputs = system.structure.inputs
     state = system.state
     ports = system.ports
@@ -174,10 +174,10 @@ def add_energies(system, level):
     # Work is bilinear in drive and inputs, loss quadratic in the inputs.
     work = 0.0
     for i in range(3):
-        work += inputs[size + i] * sum_products(structure.work[level, i], inputs)
+        work += inputs[size + i] * sum_products(structure.responses.work[level, i], inputs)
     loss = 0.0
     for i in range(inputs.size):
-        loss += inputs[i] * sum_products(structure.loss[level, i], inputs)
+        loss += inputs[i] * sum_products(structure.responses.loss[level, i], inputs)
 
     work -= totals[Total.REST]
     totals[Total.WORK_IN] += work
@@ -220,7 +220,17 @@ def move_ports(system, level):
 
 @njit(**NJIT_CALL)
 def find_port_residual(system, level, size):
-    """Return the largest residual of the ports over its tolerance; `size` is the largest force [N]."""
+    """Return the largest residual of the ports over its tolerance.
+
+    Parameters
+    ----------
+    system : march_rows_kernels.System
+        Arrays of the march; `ports.newton.residual` has the residuals [N].
+    level : int
+        Level of the step, which lasts a whole step over 2^level.
+    size : float
+        Largest force of a port [N].
+    """
     ports = system.ports
     moves = ports.values
     heave = int(ports.contact[0])
@@ -230,38 +240,40 @@ def find_port_residual(system, level, size):
         noise = INCREMENT_ROUND_OFF * abs(moves[Port.FREE, p]) / own if own > 0 else 0.0
         weight = CONTACT_WEIGHT if p >= heave >= 0 else 1.0
         if own > 0 or p != 0 or not system.structure.path.size:
-            largest = max(largest, weight * abs(ports.vector[p]) / (RESIDUAL * size + noise))
+            largest = max(
+                largest, weight * abs(ports.newton.residual[p]) / (RESIDUAL * size + noise)
+            )
     return largest
 
 
 @njit(**NJIT_CALL)
 def subtract_step(system, fraction):
-    """Subtract a fraction of Newton's step `ports.step` from port forces and shear increments, from their rows BASE."""
+    """Subtract a fraction of Newton's step from port forces and shear increments, from their rows BASE."""
     ports = system.ports
-    shear = system.points.shear
+    shear = system.points.pieces.shear
     n_ports = ports.values.shape[1]
     for p in range(n_ports):
-        ports.values[Port.FORCE, p] = ports.values[Port.BASE, p] - fraction * ports.step[p]
-    for k in range(system.points.stiffness.size):
-        shear[Shear.TRIAL, k] = shear[Shear.BASE, k] - fraction * ports.step[n_ports + k]
+        ports.values[Port.FORCE, p] = ports.values[Port.BASE, p] - fraction * ports.newton.step[p]
+    for k in range(system.points.pieces.stiffness.size):
+        shear[Shear.TRIAL, k] = shear[Shear.BASE, k] - fraction * ports.newton.step[n_ports + k]
 
 
 @njit(**NJIT_CALL)
 def store_base(system):
     """Copy port forces and shear increments to their rows BASE, from which a line search starts."""
-    shear = system.points.shear
+    shear = system.points.pieces.shear
     moves = system.ports.values
     for p in range(moves.shape[1]):
         moves[Port.BASE, p] = moves[Port.FORCE, p]
-    for k in range(system.points.stiffness.size):
+    for k in range(system.points.pieces.stiffness.size):
         shear[Shear.BASE, k] = shear[Shear.TRIAL, k]
 
 
 @njit(**NJIT_CALL)
 def extrapolate_shear(points, dt):
     """Extrapolate the increments of the pieces in a step of `dt` [s] by a parabola through the last three steps."""
-    shear = points.shear
-    for k in range(points.stiffness.size):
+    shear = points.pieces.shear
+    for k in range(points.pieces.stiffness.size):
         rate = 3 * (shear[Shear.LAST, k] - shear[Shear.EARLIER, k]) + shear[Shear.FIRST, k]
         shear[Shear.TRIAL, k] = dt * rate
 
@@ -269,8 +281,8 @@ def extrapolate_shear(points, dt):
 @njit(**NJIT_CALL)
 def advance_shear(points, dt):
     """Advance the shear coordinates by their increments in a step of `dt` [s], and store their mean rates."""
-    shear = points.shear
-    for k in range(points.stiffness.size):
+    shear = points.pieces.shear
+    for k in range(points.pieces.stiffness.size):
         shear[Shear.VALUE, k] += shear[Shear.TRIAL, k]
         shear[Shear.FIRST, k] = shear[Shear.EARLIER, k]
         shear[Shear.EARLIER, k] = shear[Shear.LAST, k]
@@ -318,14 +330,14 @@ def find_point_load(points, index, x, resultant):
     resultant : float
         Resultant [N].
     """
-    node = points.node[index]
-    if node >= points.nodal.size:
-        return points.averaged[node - points.nodal.size]
+    node = points.loads.node[index]
+    if node >= points.loads.nodal.size:
+        return points.loads.averaged[node - points.loads.nodal.size]
     if node >= 0:
-        return points.nodal[node]
+        return points.loads.nodal[node]
     if node == LOWER:
-        return points.share[index] * interpolate_pressure(x, points.pressure)
-    return points.share[index] * resultant
+        return points.loads.share[index] * interpolate_pressure(x, points.loads.pressure)
+    return points.loads.share[index] * resultant
 
 
 @njit(**NJIT_CALL)
@@ -348,7 +360,7 @@ def pick_load(values, row, direction):
 def solve_holds(system, state, drive):
     """Write the forces that hold ports at rest at an instant to `Port.HOLD` [N].
 
-    `ports.vector` has the forces of the other ports.
+    `ports.newton.residual` has the forces of the other ports.
 
     Parameters
     ----------
@@ -373,16 +385,16 @@ def solve_holds(system, state, drive):
             acceleration = -structure.modes[1, i] * drive - structure.modes[0, i] * state[i]
             acceleration -= sum_products(structure.damping[i], state[n:])
             total += ports.rows[p, i] * acceleration
-        ports.vector[p] = total
+        ports.newton.residual[p] = total
 
     solve_held(system)
     for p in range(n_ports):
-        ports.values[Port.HOLD, p] = ports.vector[p]
+        ports.values[Port.HOLD, p] = ports.newton.residual[p]
 
 
 @njit(**NJIT_CALL)
 def solve_held(system):
-    """Solve grip . x = vector for the ports at rest, in place in `ports.vector`.
+    """Solve grip . x = vector for the ports at rest, in place in `ports.newton.residual`.
 
     `grip` is the acceleration of ports per force. The entries of the other ports are given values of x.
     """
@@ -391,12 +403,12 @@ def solve_held(system):
     for p in range(n_ports):
         is_held = ports.values[Port.HELD, p] > 0
         for k in range(n_ports):
-            ports.matrix[p, k] = ports.grip[p, k] if is_held else 0.0
+            ports.newton.matrix[p, k] = ports.grip[p, k] if is_held else 0.0
         if is_held:
-            ports.matrix[p, p] *= 1 + ports.redundant[p]
+            ports.newton.matrix[p, p] *= 1 + ports.redundant[p]
         else:
-            ports.matrix[p, p] = 1.0
-    solve_linear(ports.matrix, ports.vector, n_ports)
+            ports.newton.matrix[p, p] = 1.0
+    solve_linear(ports.newton.matrix, ports.newton.residual, n_ports)
 
 
 @njit(**NJIT_CALL)
@@ -413,14 +425,14 @@ def return_ports(system):
     # Places and then velocities: grip . change = the deviation of the ports that hold.
     for first in (0, n):
         for p in range(n_ports):
-            ports.vector[p] = 0.0
+            ports.newton.residual[p] = 0.0
             if ports.values[Port.HELD, p] > 0:
-                ports.vector[p] = ports.values[Port.RETURN, p]
+                ports.newton.residual[p] = ports.values[Port.RETURN, p]
                 if first > 0:
-                    ports.vector[p] = sum_products(ports.rows[p], state[n:])
+                    ports.newton.residual[p] = sum_products(ports.rows[p], state[n:])
 
         solve_held(system)
         for p in range(n_ports):
             for i in range(n):
-                change = ports.rows[p, i] * ports.vector[p] / system.options.mass
+                change = ports.rows[p, i] * ports.newton.residual[p] / system.options.mass
                 state[first + i] -= change

@@ -6,9 +6,33 @@ from ..kernel_cache.jit import njit
 
 @njit(**NJIT_CALL)
 def slide_lists(lists, numbers, values, count, step):
-    """Leave the values of the points, the arguments of `lists_kernels.slide_lists`, as they are."""
+    """Leave the values of the points as they are.
+
+    Parameters
+    ----------
+    lists : friction.bonds.strip_rows_kernels.BondLists
+        Lists of bonds.
+    numbers, values : array
+        Numbers of the law, and values of the points.
+    count : int
+        Number of points.
+    step : Step
+        Duration of the step.
+    """
 
 
 @njit(**NJIT_CALL)
 def advance_lists(lists, numbers, values, count, duration):
-    """Leave the lists and the values of the points, the arguments of `lists_kernels.advance_lists`, as they are."""
+    """Leave the lists and the values of the points as they are.
+
+    Parameters
+    ----------
+    lists : friction.bonds.strip_rows_kernels.BondLists
+        Lists of bonds.
+    numbers, values : array
+        Numbers of the law, and values of the points.
+    count : int
+        Number of points.
+    duration : float
+        Duration of the step [s].
+    """

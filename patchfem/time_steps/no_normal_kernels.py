@@ -27,7 +27,17 @@ def add_slopes(system, level):
 
 @njit(**NJIT_CALL)
 def find_holds(system, state, drive):
-    """Write the forces that hold ports at rest, for the arguments of `normal_kernels.find_holds`."""
+    """Write the forces that hold ports at rest at an instant to `Port.HOLD` [N].
+
+    Parameters
+    ----------
+    system : march_rows_kernels.System
+        Arrays of the march; `ports.newton.residual` has the forces of the points of each port.
+    state : (2 n,) array
+        Modal coordinates and velocities.
+    drive : float
+        Drive at this instant [m s-2].
+    """
     solve_holds(system, state, drive)
 
 

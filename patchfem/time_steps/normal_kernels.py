@@ -15,12 +15,12 @@ from .motion_kernels import find_modal_energy, solve_holds, sum_products
 
 @njit(**NJIT_CALL)
 def average_forces(points):
-    """Write the weighted averages of the nodal forces behind each node to `points.averaged`, and their sums.
+    """Write the weighted averages of the nodal forces behind each node to `points.loads.averaged`, and their sums.
 
     The averages for slides to +x come first, then those for slides to -x. A node without load has the average 0. The sum
     behind a node ends at the first segment whose two nodes carry no load.
     """
-    forces = points.nodal
+    forces = points.loads.nodal
     n = forces.size
     for k in range(2):
         total = 0.0
@@ -28,12 +28,12 @@ def average_forces(points):
             load = 0.0
             s = j - 1 + k
             while forces[j] > 0 and 0 <= s < n - 1 and (forces[s] > 0 or forces[s + 1] > 0):
-                weights = points.averages[k, j, s]
+                weights = points.loads.averages[k, j, s]
                 load += weights[0] * forces[s] + weights[1] * forces[s + 1]
                 s += 2 * k - 1
-            points.averaged[k * n + j] = load
+            points.loads.averaged[k * n + j] = load
             total += load
-        points.averaged[2 * n + k] = total
+        points.loads.averaged[2 * n + k] = total
 
 
 @njit(**NJIT_CALL)
@@ -51,7 +51,7 @@ def find_resultant(system, forces):
     if slot < 0:
         return -1.0
     press_state(system.sets, slot, -up, turn, forces)
-    if system.points.averages.size:
+    if system.points.loads.averages.size:
         average_forces(system.points)
     energy = compute_energy(system.sets, slot, up, turn)
     return max(system.sets.reference[REFERENCE_LOAD_INDEX] - energy.heave_slope, 0.0)
@@ -73,8 +73,8 @@ def add_residuals(system):
         moves[Port.INCREMENT, pitch],
         ports.contact[2:11],
     )
-    ports.vector[heave] += ports.contact[2]
-    ports.vector[pitch] += ports.contact[3]
+    ports.newton.residual[heave] += ports.contact[2]
+    ports.newton.residual[pitch] += ports.contact[3]
     return abs(ports.contact[2])
 
 
@@ -89,7 +89,7 @@ def add_slopes(system, level):
         p = heave if i == 0 else pitch
         for k in range(ports.values.shape[1]):
             change = ports.contact[7 + 2 * i] * compliance[0, heave, k]
-            ports.matrix[p, k] -= change + ports.contact[8 + 2 * i] * compliance[0, pitch, k]
+            ports.newton.matrix[p, k] -= change + ports.contact[8 + 2 * i] * compliance[0, pitch, k]
 
 
 @njit(**NJIT_CALL)
@@ -99,7 +99,7 @@ def find_holds(system, state, drive):
     Parameters
     ----------
     system : march_rows_kernels.System
-        Arrays of the march; `ports.vector` has the forces of the points of each port.
+        Arrays of the march; `ports.newton.residual` has the forces of the points of each port.
     state : (2 n,) array
         Modal coordinates and velocities.
     drive : float
@@ -112,8 +112,8 @@ def find_holds(system, state, drive):
     up = sum_products(ports.rows[heave], state[:n])
     turn = sum_products(ports.rows[pitch], state[:n])
     energy = compute_energy(system.sets, system.sets.counters[PRESENT_SLOT_INDEX], up, turn)
-    ports.vector[heave] += energy.heave_slope
-    ports.vector[pitch] += energy.rotation_slope
+    ports.newton.residual[heave] += energy.heave_slope
+    ports.newton.residual[pitch] += energy.rotation_slope
     solve_holds(system, state, drive)
 
 

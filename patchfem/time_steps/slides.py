@@ -97,7 +97,7 @@ def follow(contact: Contact, time, slide, frames=(), say=None, report=None) -> S
 
     join_error = 0.0
     if system.options.has_lists:
-        join_error = float(system.lists.states[:, ListState.JOIN_ERROR].max(initial=0.0))
+        join_error = float(system.points.lists.states[:, ListState.JOIN_ERROR].max(initial=0.0))
     return SlideMotion(
         rows[:, Sample.PORTS],
         rows[:, Sample.PORTS + 1],

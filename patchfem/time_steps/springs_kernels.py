@@ -12,9 +12,24 @@ SMALL_PHASE = 1e-4  # phase [rad] below which a series replaces sin(x)/x
 
 @njit(**NJIT_CALL)
 def slide_cubic(numbers, memory, trial, values, count, step):
-    """Move a block of springs of force k q^3; the package describes the arguments (`time_steps`).
+    """Move a block of springs of force k q^3.
 
     Rows of `numbers`: k [N/m3]. Memory: q [m].
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
     """
     for j in range(count):
         k = 0.25 * numbers[j]
@@ -34,9 +49,22 @@ def slide_cubic(numbers, memory, trial, values, count, step):
 def slide_interlock(numbers, memory, trial, values, count, step):
     """Move a block of springs of force k/w sin(w q), w = 2 pi/wavelength.
 
-    The package describes the arguments (`time_steps`).
-
     Rows of `numbers`: k [N/m], wavelength [m]. Memory: q [m].
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
     """
     for j in range(count):
         k = numbers[j]

@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..friction.bonds.strip_rows_kernels import BondLists
+
 # Points of a block, the entries of a row; of 16, 32 and 48, the fastest for sets of 47 and of 107 points
 WIDTH = 48
 VECTOR = 4  # numbers that a processor handles at once; loops over whole vectors need no remainder
@@ -162,26 +164,12 @@ class ListRow(IntEnum):
     INDEX = WIDTH
 
 
-class Points(NamedTuple):
-    """Points of p ports in b blocks; r shear coordinates of the pieces.
+class Layout(NamedTuple):
+    """Laws and ports of b blocks of points.
 
     - law, port, count, n_memory (b,): law, port, number of points and used entries of the memory of each block
     - first (p + 1,): first block of each port
-    - shears (p, 2): first shear coordinate of each port, and the one after its last; several ports may have the same
-    - numbers (b, k), memory, trial (b, l), values (b, v): arrays of the laws (`time_steps`)
-    - node (b, s): node whose force is the load of a point; -1 for a fraction `share` of the resultant, -2 for `share`
-      times the pressure of the lower piece at the place of the point. s = WIDTH; 2 WIDTH with the loads of slides to -x
-    - share, place (b, s): fraction of the resultant or factor of the pressure [N]; position at rest [m]
-    - bent (r, 2): first block of the points that follow a shear coordinate, and the one after their last
-    - shapes (r, b WIDTH), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
-    - shear (8, r): see `march_rows_kernels.Shear`
     - is_spring (p,): whether the points of a port are springs, whose work is not friction
-    - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
-    - nodal (n,): forces of the nodes of a patch [N]
-    - averages (2, n, n - 1, 2): weights of these forces at both ends of a segment in averages for slides to +x and to -x
-    - averaged (2 n + 2,): these averages [N], and their sums; their numbers as nodes begin with n
-    - clock (1,): duration of the last step [s], 0 at the start
-    - products (r, 2): workspace
     """
 
     law: np.ndarray
@@ -189,22 +177,64 @@ class Points(NamedTuple):
     count: np.ndarray
     n_memory: np.ndarray
     first: np.ndarray
-    shears: np.ndarray
-    numbers: np.ndarray
-    memory: np.ndarray
-    trial: np.ndarray
-    values: np.ndarray
+    is_spring: np.ndarray
+
+
+class Loads(NamedTuple):
+    """Where the loads of the points in b blocks come from.
+
+    - node (b, s): node whose force is the load of a point; -1 for a fraction `share` of the resultant, -2 for `share`
+      times the pressure of the lower piece at the place of the point. s = WIDTH; 2 WIDTH with the loads of slides to -x
+    - share, place (b, s): fraction of the resultant or factor of the pressure [N]; position at rest [m]
+    - pressure (2, k): positions [m] and relative pressures of the lower piece, or (2, 0)
+    - nodal (n,): forces of the nodes of a patch [N]
+    - averages (2, n, n - 1, 2): weights of these forces at both ends of a segment in averages for slides to +x and to -x
+    - averaged (2 n + 2,): these averages [N], and their sums; their numbers as nodes begin with n
+    """
+
     node: np.ndarray
     share: np.ndarray
     place: np.ndarray
-    bent: np.ndarray
-    shapes: np.ndarray
-    stiffness: np.ndarray
-    shear: np.ndarray
-    is_spring: np.ndarray
     pressure: np.ndarray
     nodal: np.ndarray
     averages: np.ndarray
     averaged: np.ndarray
+
+
+class Pieces(NamedTuple):
+    """Shear of the elastic pieces behind points of p ports in b blocks, by r coordinates.
+
+    - shears (p, 2): first shear coordinate of each port, and the one after its last; several ports may have the same
+    - bent (r, 2): first block of the points that follow a shear coordinate, and the one after their last
+    - shapes (r, b WIDTH), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
+    - shear (8, r): see `march_rows_kernels.Shear`
+    - clock (1,): duration of the last step [s], 0 at the start
+    - products (r, 2): workspace
+    """
+
+    shears: np.ndarray
+    bent: np.ndarray
+    shapes: np.ndarray
+    stiffness: np.ndarray
+    shear: np.ndarray
     clock: np.ndarray
     products: np.ndarray
+
+
+class Points(NamedTuple):
+    """Points of all ports in b blocks.
+
+    - blocks: laws and ports
+    - numbers (b, k), memory, trial (b, l), values (b, v): arrays of the laws (`time_steps`)
+    - loads, pieces: loads of the points, and shear of the pieces behind them
+    - lists: lists of bonds
+    """
+
+    blocks: Layout
+    numbers: np.ndarray
+    memory: np.ndarray
+    trial: np.ndarray
+    values: np.ndarray
+    loads: Loads
+    pieces: Pieces
+    lists: BondLists

@@ -1,7 +1,5 @@
 """Arrays of a march of contact points, and the states that are read from it."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
@@ -15,15 +13,28 @@ from .march_rows_kernels import (
     LOWER,
     RESULTANT,
     Flank,
+    Newton,
     Options,
     Port,
     Ports,
+    Responses,
     Shear,
     Structure,
     System,
     Total,
 )
-from .step_rows_kernels import N_VALUES, WIDTH, BondRow, Law, ListRow, Points, Value
+from .step_rows_kernels import (
+    N_VALUES,
+    WIDTH,
+    BondRow,
+    Law,
+    Layout,
+    ListRow,
+    Loads,
+    Pieces,
+    Points,
+    Value,
+)
 
 MAX_ANGLE = 0.5  # largest phase of the fastest mode in the step of a matrix exponential [rad]
 N_GAUSS = 8  # Gauss points of the integrals over that step
@@ -38,22 +49,6 @@ MIN_RANK = (
 TABLE_DISTANCE = 100.0
 END_MARGIN = 1e-9
 N_EVENT_LEVELS = 20  # the same with rigid friction, whose stops and releases are located by halving
-
-
-class Responses(NamedTuple):
-    """Motion, viscous loss and work of the drive in steps of several lengths, in the rows of `march_rows_kernels.Structure`.
-
-    N = 3 n + 3 inputs: 2 n coordinates and velocities, the drive with two derivatives, and n constant modal forces over
-    mass.
-
-    - motion: (levels, 2 n, N) motion at the end of a step per input
-    - loss: (levels, N, N) viscous loss [J] as a quadratic form of the inputs
-    - work: (levels, 3, N) work of the drive [J] as a bilinear form of the drive and the inputs
-    """
-
-    motion: np.ndarray
-    loss: np.ndarray
-    work: np.ndarray
 
 
 def make_responses(modes: ModalBasis, step: float, levels: int) -> Responses:
@@ -156,21 +151,19 @@ def make_system(
     points = _make_points(contact, len(rows))
     if not contact.has_loads:
         is_constant = slice(BondRow.IS_CONSTANT, BondRow.IS_CONSTANT + WIDTH)
-        points.numbers[points.law == Law.BONDS, is_constant] = 1.0
-    size = len(rows) + points.stiffness.size
+        points.numbers[points.blocks.law == Law.BONDS, is_constant] = 1.0
+    size = len(rows) + points.pieces.stiffness.size
     ports = Ports(
         rows,
         np.array(compliance).reshape(levels, 2, len(rows), len(rows)) / mass,
         rows @ rows.T / mass,
         _find_redundant(rows, contact),
         _make_port_values(contact, len(rows)),
-        np.zeros((size, size)),
-        np.zeros(size),
-        np.zeros(size),
+        Newton(np.zeros((size, size)), np.zeros(size), np.zeros(size)),
         press,
     )
     structure = Structure(
-        *responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(3 * n + 3)
+        responses, shape, damping, np.zeros((1, 3)), np.zeros(0), np.zeros(0), np.zeros(3 * n + 3)
     )
     options = Options(
         mass,
@@ -185,10 +178,9 @@ def make_system(
     if start is not None:
         state[0] = [*start.z, *start.v]
     sets = make_no_sets() if contact.sets is None else contact.sets.make_arrays()
-    lists = _make_lists(contact, points)
     flank = make_flank(contact)
     totals = np.zeros(len(Total))
-    system = System(structure, ports, points, lists, flank, sets, state, totals, options)
+    system = System(structure, ports, points, flank, sets, state, totals, options)
     _set_start(system, contact)
     return system
 
@@ -197,8 +189,8 @@ def _set_start(system: System, contact) -> None:
     """Give points and ports the displacements and velocities of the start, and find the loads there."""
     points = system.points
     n = system.state.shape[1] // 2
-    rows = system.ports.rows[points.port]
-    values = points.values.reshape(len(points.law), N_VALUES, WIDTH)
+    rows = system.ports.rows[points.blocks.port]
+    values = points.values.reshape(len(points.blocks.law), N_VALUES, WIDTH)
     slides = rows @ system.state[0, :n]
     velocities = rows @ system.state[0, n:]
     values[:, Value.TOTAL // WIDTH] = slides[:, None]
@@ -207,9 +199,9 @@ def _set_start(system: System, contact) -> None:
     ]
 
     # Springs refer to the displacement at rest; rigid friction opposes the velocity of its port.
-    is_spring = points.is_spring[points.port].astype(bool)
+    is_spring = points.blocks.is_spring[points.blocks.port].astype(bool)
     points.memory[is_spring, 0] = slides[is_spring]
-    is_rigid = points.law == Law.COULOMB
+    is_rigid = points.blocks.law == Law.COULOMB
     back, load = (values[:, row // WIDTH, 0] for row in (Value.END_BACK, Value.END_LOAD))
     limits = points.numbers[:, WIDTH] * np.where(velocities < 0, back, load)
     points.memory[is_rigid, 0] = np.sign(velocities)[is_rigid]
@@ -227,11 +219,11 @@ def _climb_first(system: System, contact) -> None:
     points = system.points
     for row in (Value.START_LOAD, Value.END_LOAD, Value.START_BACK, Value.END_BACK):
         points.values[:, row : row + WIDTH] *= ratio
-    is_bonds = points.law == Law.BONDS
+    is_bonds = points.blocks.law == Law.BONDS
     points.memory[is_bonds, WIDTH:] *= ratio
-    points.memory[points.law == Law.CELLS, WIDTH:] *= ratio
-    points.memory[points.law == Law.SLIDERS] *= ratio
-    points.memory[points.law == Law.BOUC_WEN, WIDTH:] *= ratio
+    points.memory[points.blocks.law == Law.CELLS, WIDTH:] *= ratio
+    points.memory[points.blocks.law == Law.SLIDERS] *= ratio
+    points.memory[points.blocks.law == Law.BOUC_WEN, WIDTH:] *= ratio
 
 
 def _find_redundant(rows, contact) -> np.ndarray:
@@ -347,30 +339,27 @@ def _make_points(contact, n_ports: int) -> Points:
     parts = [shapes[k, WIDTH * begin : WIDTH * end] for k, (begin, end) in enumerate(bent)]
     shear[Shear.SCALE] = [np.sqrt(np.count_nonzero(part) / (part @ part)) for part in parts]
     n_nodes = 0 if contact.sets is None else contact.sets.x.size
-    return Points(
-        np.repeat([_number_law(point_set.law.law) for point_set in sets], counts).astype(np.int64),
+    n_averaged = 0 if contact.averages is None else 2 * n_nodes + 2
+    laws = [_number_law(point_set.law.law) for point_set in sets]
+    layout = Layout(
+        np.repeat(laws, counts).astype(np.int64),
         np.repeat(np.arange(len(counts)), counts),
         np.concatenate([np.zeros(0, np.int64), *(part.count for part in blocks)]),
         _count_memory(sets, blocks),
         np.cumsum([0, *counts, *[0] * n_moving]),
-        shears,
-        numbers,
-        memory,
-        memory.copy(),
-        values,
-        *(np.hstack(array) for array in (node, share, place)),
-        bent,
-        shapes,
-        stiffness,
-        shear,
         np.array([point_set.is_spring for point_set in sets] + [False] * n_moving, bool),
+    )
+    loads = Loads(
+        *(np.hstack(array) for array in (node, share, place)),
         pressure,
         np.zeros(n_nodes),
         np.zeros((0, 0, 0, 0)) if contact.averages is None else contact.averages,
-        np.zeros(0 if contact.averages is None else 2 * n_nodes + 2),
-        np.zeros(1),
-        np.zeros((stiffness.size, 2)),
+        np.zeros(n_averaged),
     )
+    products = np.zeros((stiffness.size, 2))
+    pieces = Pieces(shears, bent, shapes, stiffness, shear, np.zeros(1), products)
+    lists = _make_lists(contact, layout, numbers)
+    return Points(layout, numbers, memory, memory.copy(), values, loads, pieces, lists)
 
 
 def _number_law(law: Law | str) -> int:
@@ -414,12 +403,12 @@ def _join_pressures(sets) -> tuple[list[list[float]], np.ndarray]:
     return shifts, np.concatenate([np.zeros((2, 0)), *parts], axis=1)
 
 
-def _make_lists(contact, points: Points):
+def _make_lists(contact, blocks: Layout, numbers: np.ndarray):
     """Return the lists of bonds (`strip_rows_kernels.BondLists`), and number the points that have one."""
     if not contact.has_lists:
         return make_no_lists(0)
-    is_used = (points.law == Law.LIST)[:, None] & (np.arange(WIDTH) < points.count[:, None])
-    indices = points.numbers[:, ListRow.INDEX : ListRow.INDEX + WIDTH]
+    is_used = (blocks.law == Law.LIST)[:, None] & (np.arange(WIDTH) < blocks.count[:, None])
+    indices = numbers[:, ListRow.INDEX : ListRow.INDEX + WIDTH]
     indices[is_used] = np.arange(is_used.sum())
     sets = [point_set for point_set in contact.point_sets if point_set.bond_sum is not None]
     return join_lists([make_lists(*part.bond_sum, part.law.load) for part in sets])

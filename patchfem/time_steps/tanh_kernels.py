@@ -42,10 +42,25 @@ def solve_velocity(speed, stiffness, given):
 
 @njit(**NJIT_CALL)
 def slide_tanh(numbers, memory, trial, values, count, step):
-    """Slide a block of points of the regularised law; the package describes the arguments (`time_steps`).
+    """Slide a block of points of the regularised law.
 
     Rows of `numbers`: coefficient of friction, speed v_0 [m/s], compliance d [m/N]. Memory: force [N], its last change
     [N], velocity of slip over v_0.
+
+    Parameters
+    ----------
+    numbers : (k,) array
+        Numbers of the law, in rows of WIDTH points.
+    memory : (l,) array
+        State of the points at the start of the step.
+    trial : (l,) array
+        State of the points at the end of the step; output.
+    values : (v,) array
+        Rows of `step_rows_kernels.Value`; the outputs are written.
+    count : int
+        Number of points in the block.
+    step : Step
+        Duration of the step [s], and factors of the formula for a velocity [1/s].
     """
     for j in range(count):
         speed = numbers[WIDTH + j]

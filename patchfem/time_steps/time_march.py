@@ -221,8 +221,6 @@ class March:
         self.system = system._replace(
             structure=system.structure._replace(
                 responses=fresh.structure.responses,
-                loss=fresh.structure.loss,
-                work=fresh.structure.work,
             ),
             ports=system.ports._replace(compliance=fresh.ports.compliance),
             options=system.options._replace(step=float(step)),
@@ -358,13 +356,13 @@ class March:
             names = ("created", "dissipated", "strips")
             ledger |= dict(zip(names, map(float, self._sum_lists() - self.first_sums)))
             # Largest error of a join that made room in a full list, relative to the load
-            errors = self.system.lists.states[:, ListState.JOIN_ERROR]
+            errors = self.system.points.lists.states[:, ListState.JOIN_ERROR]
             ledger["join_error"] = float(errors.max(initial=0.0))
         return ledger
 
     def _sum_lists(self) -> np.ndarray:
         """Return created and dissipated energy [J] of the lists of bonds, and the length of the longest one."""
-        states = self.system.lists.states
+        states = self.system.points.lists.states
         sums = states[:, [ListState.CREATED, ListState.DISSIPATED]].sum(axis=0)
         return np.append(sums, states[:, ListState.LARGEST_COUNT].max(initial=0.0))
 
@@ -413,7 +411,9 @@ def make_snapshot(system: System, point_sets, motion: tuple[float, ...]) -> Snap
         """Return a row of the values of all points."""
         parts = []
         for p, count in enumerate(counts):
-            blocks = points.values[points.first[p] : points.first[p + 1], row : row + WIDTH]
+            blocks = points.values[
+                points.blocks.first[p] : points.blocks.first[p + 1], row : row + WIDTH
+            ]
             parts.append(blocks.flatten()[:count])
         return np.concatenate(parts)
 
@@ -426,7 +426,7 @@ def make_snapshot(system: System, point_sets, motion: tuple[float, ...]) -> Snap
     moves = np.repeat(system.ports.values[Port.SLIDE, : len(counts)], counts)
     arrays = forces, collect(Value.STRETCH), bend, collect(Value.END_LOAD), moves
     vertical = float(system.flank[Flank.VERTICAL]) if system.flank.size else 0.0
-    return Snapshot(*motion, *arrays, points.nodal.copy(), vertical)
+    return Snapshot(*motion, *arrays, points.loads.nodal.copy(), vertical)
 
 
 def march(
@@ -518,7 +518,7 @@ def march(
         count = (n_steps - record.n_window - run.done) // size
         state = run.system.state[0]
         memory = np.concatenate(
-            [run.system.points.memory.ravel(), run.system.points.shear[Shear.VALUE]]
+            [run.system.points.memory.ravel(), run.system.points.pieces.shear[Shear.VALUE]]
         )
         now = np.concatenate([state, memory])
         if can_repeat and count > 0 and record.before.size == now.size:

@@ -15,9 +15,14 @@ from patchfem.campaigns import (
     describe_best_setting,
     numerical_settings,
 )
-from patchfem.campaigns.convergence import find_order, find_sufficient_run, measure_convergence
+from patchfem.campaigns.convergence import (
+    extrapolate_sufficient_run,
+    find_order,
+    find_sufficient_run,
+    measure_convergence,
+)
 from patchfem.core import Measure
-from patchfem.export.costs import make_cost_answer
+from patchfem.export.costs import describe_convergence, make_cost_answer
 from patchfem.export.show import make_lines
 from patchfem.runs.run import run
 
@@ -148,6 +153,29 @@ def test_exact_order_of_power_is_observed(order):
     # without its error the finest run is not known to be accurate
     forget_errors(runs[-1], "loop_area")
     assert find_sufficient_run(runs, "loop_area", found, 1e-2) is None
+
+
+def test_exact_order_towards_a_better_value_bears_a_change_of_sign():
+    """Differences +-3 n^-1.7 from a more accurate value have the order 1.7, though the values swing around it."""
+    runs = make_series(1.7)
+    for k, row in enumerate(runs):
+        one = row.measures["loop_area"]
+        row.measures["loop_area"] = replace(one, value=2.0 + (-1) ** k * (one.value - 2.0))
+    assert measure_convergence(runs, "steps_per_cycle", "loop_area").order is None
+    best = Measure(2.0, "J", 0.0)
+    found = measure_convergence(runs, "steps_per_cycle", "loop_area", best)
+    assert found.order == pytest.approx(1.7, rel=1e-8)
+
+
+def test_exact_sufficient_setting_is_extrapolated_from_stated_errors():
+    """Errors 3.3 n^-p are within 1e-4 of 2 from n = (3.3/2e-4)^(1/p) on, where CPU seconds are n/100."""
+    runs = make_series(1.7)
+    far = extrapolate_sufficient_run(runs, "steps_per_cycle", "loop_area", 1e-4)
+    steps = (3.3 / 2e-4) ** (1 / 1.7)
+    assert (far.value, far.seconds) == pytest.approx((steps, steps / 100), rel=1e-3)
+    assert extrapolate_sufficient_run(runs, "steps_per_cycle", "loop_area", 0.1) is None
+    (row,) = describe_convergence(make_series(1.0), "steps_per_cycle")
+    assert row["for_1_permille"] == "about 1700, 20 CPU s"
 
 
 def test_exact_values_without_a_limit_have_no_order():

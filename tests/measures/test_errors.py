@@ -7,7 +7,7 @@ from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table
 import patchfem as pf
 from patchfem.convergence import ERROR_SAFETY_FACTOR
 from patchfem.measures import estimate_convergence_errors
-from patchfem.measures.errors import add_errors
+from patchfem.measures.errors import add_errors, add_run_error_estimates
 
 NAME = "relative_displacement_amplitude"
 
@@ -81,6 +81,12 @@ def test_exact_stick_fraction_has_error_of_instants_at_which_slip_starts():
     measures = add_errors(values, errors)
     assert measures["stick_fraction"].error == pytest.approx(2.8e-3 / np.pi + 1e-6)
     assert measures["slip_start_phase"].error == pytest.approx(2.801e-3)
+
+    # So are the errors that the run itself shows, and the relative error of all measures.
+    measures = add_run_error_estimates(measures, {"slip_start_phase": 0.1})
+    assert measures["stick_fraction"].error == pytest.approx(0.102801 / np.pi)
+    measures = add_errors(values, min_relative_error=1e-9)
+    assert measures["stick_fraction"].error >= measures["slip_start_phase"].error / np.pi
 
 
 def test_exact_secant_stiffness_of_zero_has_round_off_of_forces():

@@ -9,6 +9,7 @@ from scene_runs import load_scene, run_scene
 from scene_texts import COATED, COULOMB, KILOGRAM, POINT, SLIDE
 
 from patchfem import load, plan
+from patchfem.runs.probe import run_probe
 from patchfem.runs.run import run
 
 PROBED = COATED.replace("0.5 mm", "1 mm") + COULOMB + SLIDE + "cycles = 2\n"
@@ -54,3 +55,25 @@ def test_exact_kinetic_coefficient_decides_about_sticking(kinetic, sticks):
     assert ("does not limit the amplitude" in sentence) != sticks
     assert (run_scene(FORCED, changes).measures["stick_fraction"].value > 0) == sticks
     assert run_plan.groups["knee_force"] == pytest.approx(4 / np.pi * kinetic * 100)
+
+
+def test_exact_plan_of_a_sweep_is_that_of_its_first_case():
+    """A scene with [sweep] has the plan of its first case, also for a key that the scene sets itself, and says so."""
+    cases = FORCED + '[sweep]\n"drive.force" = ["25 N", "50 N"]\n"friction.static" = [0.5, 0.4]\n'
+    run_plan = plan(load(cases))
+    assert (
+        run_plan.groups == plan(load_scene(FORCED, "drive.force=25 N; friction.static=0.5")).groups
+    )
+    assert (
+        "first of 4 cases of [sweep], drive.force=25 N, friction.static=0.5;" in run_plan.verdict[0]
+    )
+
+
+def test_exact_probe_of_a_curve_names_the_curve():
+    """The time of a response curve is that of the curve, not of its peak."""
+    sweep = 'waveform = "sweep"\nfrom = "40 Hz"\nto = "60 Hz"\nrate = "1 Hz/s"\n'
+    drive = FORCED.replace('frequency = "50 Hz"\nforce', sweep + "force").replace(
+        "cycles = 200\n", ""
+    )
+    text = " ".join(run_probe(plan(load(drive + '[accuracy]\nmethod = "harmonic"\n'))).sentences)
+    assert "of it for the response curve" in text and "drive.cycles" not in text

@@ -16,8 +16,8 @@ MISSING_MESH_ERROR_NOTE = (
 )
 # Reason why a curve has no value at some amplitudes, by method
 REASONS_OF_GAPS = {
-    "balance": "no periodic motion was found at these amplitudes; the curve may turn back to "
-    "smaller amplitudes, or the mode may stop oscillating",
+    "balance": "no periodic motion was found at these amplitudes; the curve may turn back to smaller amplitudes, or the "
+    "mode may stop oscillating; give other --amplitudes",
     "quasi-static": "the static curve does not reach these amplitudes",
 }
 # Why rigid friction may have no such force

@@ -67,13 +67,9 @@ class SweepAnalysis:
 
 
 def analyse(table: SweepTable) -> SweepAnalysis:
-    """Analyse the table of results of a sweep.
-
-    A single settled case has no range and no limit.
-    """
+    """Analyse the table of results of a sweep."""
     ranges = []
-    is_comparable = np.count_nonzero(table.has_settled) != 1
-    for name in MAIN_MEASURES if is_comparable else ():
+    for name in MAIN_MEASURES:
         if name in table.measures:
             ranges += find_range(table, name)
     # of response curves, the height of the peak is what is asked for
@@ -88,7 +84,7 @@ def analyse(table: SweepTable) -> SweepAnalysis:
         cases=table.count_cases(),
         ranges=ranges,
         extremes=list(filter(None, (find_extreme(table, entry.measure) for entry in ranges))),
-        limits=find_limits(table) if is_comparable else [],
+        limits=find_limits(table),
         peaks=find_peaks(table),
         ranking=rank_keys(table),
         quantiles=compute_quantiles(table),
@@ -97,10 +93,10 @@ def analyse(table: SweepTable) -> SweepAnalysis:
 
 def find_range(table: SweepTable, name: str) -> list[MeasureRange]:
     """Return the range of the measure `name` in a table, or [] if it varies no more than its errors."""
-    values = table.select_trusted(name)
+    column = table.select_trusted(name)
+    values = column.values
     if not np.isfinite(values).any():
         return []
-    column = table.measures[name]
     low = int(np.nanargmin(values))
     high = int(np.nanargmax(values))
     difference = values[high] - values[low]

@@ -62,15 +62,15 @@ def find_extreme(table: SweepTable, name: str) -> Extreme | None:
         None if the measure is monotonic within its errors, or if no single number varies.
     """
     varied = [key for key in table.keys if key.count > 1]
-    values = table.select_trusted(name)
-    known = np.flatnonzero(np.isfinite(values))
+    column = table.select_trusted(name)
+    known = np.flatnonzero(np.isfinite(column.values))
     if len(varied) != 1 or not varied[0].is_number or known.size < MIN_CASES_OF_EXTREME:
         return None
     (key,) = varied
     known = known[np.argsort(key.values[known])]
     x = np.log(key.values[known]) if key.is_logarithmic else key.values[known]
-    y = values[known]
-    error = np.nan_to_num(table.measures[name].errors[known]).astype(float)
+    y = column.values[known]
+    error = np.nan_to_num(column.errors[known]).astype(float)
 
     # The extreme case exceeds both ends by more than the errors. Of a maximum and a minimum, the one that stands out more
     # counts.

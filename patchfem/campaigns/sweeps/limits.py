@@ -85,13 +85,13 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
         column = table.measures.get(name)
         if column is None or not np.any(np.abs(column.values) > column.floors):
             continue
-        values = table.select_trusted(name)
+        column = table.select_trusted(name)
         errors = np.nan_to_num(column.errors)
         blank = KeyLimit(name, key.key, key.unit, largest, np.nan, np.nan, np.nan, False)
         on_lines = []
         for line in lines[:, order]:
             on_lines.append(
-                _find_limit_on_line(blank, key, along[order], values[line], errors[line])
+                _find_limit_on_line(blank, key, along[order], column.values[line], errors[line])
             )
 
         # the smallest limit of all lines counts, and a limit that is never reached only if all of them are like that

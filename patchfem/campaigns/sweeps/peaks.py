@@ -20,7 +20,6 @@ ERROR_SAFETY_FACTOR = 3.0  # safety factor of the differences between interpolat
 SPLINE_DEGREES = (3, 2, 4)  # splines through all cases, the best one first
 # Numbers of cases below and above the largest one through which a polynomial goes; a kink changes it most.
 CASE_COUNTS_AROUND_PEAK = ((1, 1), (2, 1), (1, 2))
-MAX_STEADY_ERROR = 0.01  # largest relative error of a steady estimate that counts as a height
 
 
 class SweptPeak(NamedTuple):
@@ -64,31 +63,17 @@ def find_peaks(table: SweepTable) -> list[PeakOnLine]:
     names = [name for name in HEIGHT_MEASURES if name in table.measures]
     if not axes or not names or not table.is_grid:
         return []
-    heights, errors = _find_heights(table, names[0])
+    column = table.select_trusted(names[0])
+    errors = np.nan_to_num(column.errors)
 
     peaks = []
     for line in table.split_lines(axes[0]):
         frequency = table.keys[axes[0]].values[line]
         line = line[np.argsort(frequency)]
-        peak = locate_peak(np.sort(frequency), heights[line], errors[line])
+        peak = locate_peak(np.sort(frequency), column.values[line], errors[line])
         if peak is not None:
             peaks.append(PeakOnLine(names[0], int(line[0]), peak))
     return peaks
-
-
-def _find_heights(table: SweepTable, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the heights (n,) of the measure `name` in a table with their errors (n,).
-
-    They are NaN where a case does not count. For a case that did not settle it is the steady estimate if that is exact
-    enough.
-    """
-    heights = table.select_trusted(name)
-    errors = np.nan_to_num(table.measures[name].errors)
-    steady = table.measures.get(f"{name}_steady")
-    if steady is None:
-        return heights, errors
-    is_used = np.isnan(heights) & (steady.errors <= MAX_STEADY_ERROR * np.abs(steady.values))
-    return np.where(is_used, steady.values, heights), np.where(is_used, steady.errors, errors)
 
 
 def locate_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> SweptPeak | None:

@@ -8,11 +8,10 @@ In: `WorkerData`, case numbers and an executor of `executors/`. Out: results by 
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from time import perf_counter
 
 import numpy as np
 
-from ... import kernel_cache
+from ... import cost_model
 from ...core import PatchfemError
 from ...model.model import Model
 from ...model.similar_models import SimilarModels
@@ -21,8 +20,8 @@ from ...runs.batch.case_results import CaseResults
 from .case_models import SweepScene
 from .cases import Cases
 
-# Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
-# with a sweep.
+# Target CPU time of a chunk [s], long compared with its transfer and its file, which a busy machine delays as well, and
+# short compared with a sweep.
 TARGET_CHUNK_SECONDS = 1.0
 MAX_CASES_TRIED = 3  # Cases that are tried until one is valid, which shows the plain keys.
 
@@ -90,11 +89,11 @@ def compute_chunk(
     Returns
     -------
     tuple
-        Elapsed time [s] without compilation, and a tuple of CaseResults and a list of the data that
+        CPU time [s] without compilation, and a tuple of CaseResults and a list of the data that
         `work.extract` returns for each case.
     """
     # The cases are computed in groups, of which each may have its own engine. A batch numbers its cases from 0.
-    begin = perf_counter() - kernel_cache.COMPILE_SECONDS[0]
+    begin = cost_model.measure_cpu_time()
     numbers = np.asarray(numbers, int)
     results = CaseResults.blank(len(numbers))
     extras = [None] * len(numbers)
@@ -107,7 +106,7 @@ def compute_chunk(
             # The title and the effects of similar models are the same.
             model = models.first if isinstance(models, SimilarModels) else models[case]
             extras[place] = work.extract(int(numbers[place]), model, part, case)
-    seconds = perf_counter() - kernel_cache.COMPILE_SECONDS[0] - begin
+    seconds = cost_model.measure_cpu_time() - begin
     return seconds, (results, extras if work.extract is not None else [])
 
 

@@ -7,7 +7,7 @@ for each measure.
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from .cases import Cases
 
 # Largest error, relative to the value, of a value that counts for statements.
 MAX_TRUSTED_RELATIVE_ERROR = 0.5
+# Largest relative error of the steady estimate of a case that did not settle; that near an onset of slip has a few percent.
+MAX_STEADY_ERROR = 0.05
 # Outcomes of cases whose motion no longer changes.
 FINAL_OUTCOMES = (Outcome.STEADY, Outcome.STUCK, Outcome.DONE, Outcome.NO_CONTACT)
 
@@ -183,18 +185,29 @@ class SweepTable:
                 words = [outcome.sentence, part.findings.get(k, "")]
                 self.messages[int(numbers[k])] = " ".join(filter(None, words))
 
-    def select_trusted(self, name: str) -> np.ndarray:
-        """Return the values (n,) of the measure `name` that count for statements on it, or NaN for others.
+    def select_trusted(self, name: str) -> MeasureColumn:
+        """Return the column of the measure `name` with only the values that count for statements on it, NaN for others.
 
-        A value counts if its case has settled, and if its error is at most half of it or meets the tolerance. The
-        case need not have settled if no settled case has a value, or if the measure is a steady estimate.
+        A value counts if its case has settled, and if its error is at most half of it or meets the tolerance. Instead of
+        the value of another case, its steady estimate counts with its error, if it is exact enough. All cases count if
+        none of them has a settled value or such an estimate, or if the measure is a steady estimate itself.
         """
         column = self.measures[name]
-        settled = self.has_settled
-        needs_settling = not name.endswith("_steady") and np.isfinite(column.values[settled]).any()
-        counts = settled if needs_settling else np.ones(len(self), bool)
+        counts = self.has_settled
+        steady = self.measures.get(f"{name}_steady")
+        if steady is not None:
+            is_used = ~counts & (steady.errors <= MAX_STEADY_ERROR * np.abs(steady.values))
+            column = MeasureColumn(
+                column.unit,
+                np.where(is_used, steady.values, column.values),
+                np.where(is_used, steady.errors, column.errors),
+                np.where(is_used, steady.floors, column.floors),
+            )
+            counts = counts | is_used
+        if name.endswith("_steady") or not counts.any():
+            counts = np.ones(len(self), bool)
         is_vague = column.misses(MAX_TRUSTED_RELATIVE_ERROR) & column.misses(self.tolerance)
-        return np.where(counts & ~is_vague, column.values, np.nan)
+        return replace(column, values=np.where(counts & ~is_vague, column.values, np.nan))
 
     def count_cases(self) -> dict[str, int | dict]:
         """Return the counts of cases in sweep.json.

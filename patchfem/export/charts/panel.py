@@ -125,7 +125,7 @@ def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) ->
     is_log : bool, optional
         Whether the axis is logarithmic.
     """
-    label = name.replace("_", " ")
+    label = " ".join(name.replace("_", " ").split())
     size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     unit, scale = choose_scale(name, unit or "1", size)
     return Axis(f"{label} [{unit}]" if unit else label, scale, is_log)

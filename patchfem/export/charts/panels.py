@@ -28,6 +28,9 @@ def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
     """
     panels = []
     for chart in charts:
+        if len(answers) > 1 and chart.y == "curve_amplitude" and chart.x == "curve_frequency":
+            panels += _make_curve_menu(answers, chart)
+            continue
         for part in _repeat_for_interfaces(chart, next(iter(answers.values())).data):
             # answers whose variables have other units need axes of their own
             groups = {}
@@ -51,6 +54,21 @@ def _repeat_for_interfaces(chart: Chart, data: Variables) -> list[Chart]:
         y = " ".join(f"{name}_{number}" for name in chart.y.split())
         charts.append(replace(chart, title=f"{chart.title}{part}", x=f"x_{number}", y=y))
     return charts
+
+
+def _make_curve_menu(answers: Answers, chart: Chart) -> list[Panel]:
+    """Return the response curves of several answers: a menu of amplitude and, under forces, compliance.
+
+    Compliances of a linear structure coincide, so that curves that differ show the effect of the level.
+    """
+    titles = {"curve_amplitude": "amplitude", "curve_compliance": "compliance (amplitude / force)"}
+    charts = [replace(chart, y=name, title=title) for name, title in titles.items()]
+    panels = [make_panel(answers, choice) for choice in charts]
+    panels = [panel for panel in panels if panel is not None]
+    if not panels:
+        return []
+    panel = replace(panels[0], title=chart.title)
+    return [replace(panel, style="menu", choices=panels) if len(panels) > 1 else panel]
 
 
 def make_panel(answers: Answers, chart: Chart) -> Panel | None:

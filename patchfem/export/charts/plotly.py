@@ -19,6 +19,8 @@ STATE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")
 OVERLAID_CURVE_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))
 ERROR_BAND_OPACITY = 0.18  # opacity of an error band, 1 for the colour of its curve
 FILM_FRAME_MILLISECONDS = 120
+# largest number of decades of a logarithmic axis with labels at 1, 2 and 5; more have room for powers of 10 only
+MAX_DECADES_WITH_DIGITS = 3
 # figure of plotly.js, or a part of it, as an object of its JSON
 Figure = dict[str, Any]
 # Position of a menu, above its chart.
@@ -44,8 +46,8 @@ def _make_layout(panel: Panel) -> Figure:
     """Return the layout of a panel: its axes, vertical lines, and whether it has a legend."""
     is_film = panel.style == "film"
     layout = {
-        "xaxis": _make_axis_layout(panel.x),
-        "yaxis": _make_axis_layout(panel.y),
+        "xaxis": _make_axis_layout(panel.x, [curve.x for curve in panel.curves]),
+        "yaxis": _make_axis_layout(panel.y, [curve.y for curve in panel.curves]),
         "showlegend": not is_film and sum(bool(curve.name) for curve in panel.curves) > 1,
     }
     if panel.style == "area":
@@ -63,14 +65,21 @@ def _make_layout(panel: Panel) -> Figure:
     return layout
 
 
-def _make_axis_layout(axis) -> Figure:
-    """Return the title and the scale of an `Axis` as plotly.js takes them."""
+def _make_axis_layout(axis, columns) -> Figure:
+    """Return the title and the scale of an `Axis` as plotly.js takes them; `columns` are the values that it shows."""
     # By default plotly.js writes 4e-14 as 40f.
-    return {
+    layout = {
         "title": {"text": axis.label},
         "type": "log" if axis.is_log else "-",
         "exponentformat": "power",
     }
+    if axis.is_log:
+        # By default the labels of one or two decades are all digits, which overlap.
+        values = np.concatenate([np.ravel(column) for column in columns])
+        values = values[np.isfinite(values) & (values > 0)]
+        if values.size and 1 < np.log10(values.max() / values.min()) < MAX_DECADES_WITH_DIGITS:
+            layout["dtick"] = "D2"
+    return layout
 
 
 def _make_vertical_line(position: float) -> Figure:
@@ -173,9 +182,11 @@ def _add_menu(figure: Figure, choices: list[Panel]) -> None:
     for number, choice in enumerate(choices):
         visible = [k == number for k, group in enumerate(groups) for _ in group]
         changes = {"shapes": list(map(_make_vertical_line, choice.marks))}
-        for name, axis in (("xaxis", choice.x), ("yaxis", choice.y)):
-            layout = _make_axis_layout(axis)
-            changes |= {f"{name}.title.text": axis.label, f"{name}.type": layout["type"]}
+        layout = _make_layout(choice)
+        for name in ("xaxis", "yaxis"):
+            axis = layout[name]
+            changes |= {f"{name}.{key}": axis.get(key) for key in ("type", "dtick")}
+            changes[f"{name}.title.text"] = axis["title"]["text"]
         arguments = [{"visible": visible}, changes]
         buttons.append({"label": choice.title, "method": "update", "args": arguments})
     figure["data"] = [

@@ -132,7 +132,9 @@ def write_histories(
             (column.label, HISTORY_FUNCTION_TYPE, time, column) for column in histories
         ] + curves
     if not curves:
-        raise PatchfemError("there is neither time nor loop to write")
+        raise PatchfemError(
+            "the run has no history over time and no friction loop, so a universal file would be empty"
+        )
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
     write_datasets(path, [make_dataset(*curve, line or "NONE") for curve in curves])
 

@@ -26,8 +26,8 @@ TRACE_INTERVAL_PROBABILITY = 0.9
 # parameters in the headline: those of a scan, of a trace with a cut-off, and of one without
 HEADLINE_PARAMETERS = (("Sa", "Sq", "Sz"), ("Ra", "Rq", "Rz"), ("Pa", "Pq", "Pt"))
 INTERVAL_NOTE = (
-    "Intervals of a single trace are 90 % intervals (5 to 95 %) by Student's t of the logarithm, from the changes of each "
-    "parameter if one section of a cut-off is left out."
+    "Intervals of a single trace are 90 % intervals (5 to 95 %) by the jackknife: each section as long as the cut-off is "
+    "left out in turn, and Student's t of the logarithm takes the changes of the parameter."
 )
 MEANS_NOTE = (
     "Means have equal weights, and 95 % intervals by Student's t from the scatter of the files, where these determine the "

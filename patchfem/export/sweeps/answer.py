@@ -117,6 +117,13 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
     if len(analysis.peaks) == 1:
         quantities |= make_peak_quantities(table, analysis.peaks[0])
 
+    for extreme in analysis.extremes:
+        side = "largest" if extreme.is_largest else "smallest"
+        low, high = extreme.interval
+        quantities[f"place_of_{side}_{extreme.measure}"] = Quantity(
+            extreme.place, extreme.unit, low=low, high=high
+        )
+
     # A limit without a value gives the reason.
     for limit in analysis.limits:
         reason = "" if np.isfinite(limit.value) else "the cases do not show where it lies"
@@ -129,7 +136,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> Quantities:
         )
 
     for name, low, high, _ in analysis.ranges[:MAX_MEASURE_RANGES]:
-        column = table.measures[name]
+        column = table.select_trusted(name)
         for word, case in (("smallest", low), ("largest", high)):
             quantities[f"{word}_{name}"] = Quantity(
                 column.values[case],

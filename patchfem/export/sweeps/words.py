@@ -11,12 +11,10 @@ from ...core import Outcome
 from ...measures import rows
 from ...runs import refine
 from ..answer import Quantities, Quantity
-from ..quantities import format_quantity, format_value
+from ..quantities import VALUE_ROUND_OFF, format_quantity, format_value
 
 MIN_NAMED_VARIANCE_FRACTION = 0.01  # fraction of the variance below which a key is not named
 MAX_NAMED_KEYS = 3  # largest number of keys whose Sobol indices a sentence names
-# Value relative to the largest one of a sweep below which it is round-off, and shown as 0.
-VALUE_ROUND_OFF = 1e-12
 
 
 def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
@@ -32,7 +30,8 @@ def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
             )
     elif analysis.peaks:
         sentences.append(_describe_peaks(table, analysis.peaks))
-    elif analysis.limits:
+    elif analysis.limits and not analysis.extremes:
+        # of a measure with an extreme inside the range of the key, the optimum is what is asked for
         sentences.append(_describe_limit(analysis.limits))
     return (*(sentence for sentence in sentences if sentence), _describe_cases(table, analysis))
 
@@ -44,9 +43,9 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     if n_known < 2:
         one = "Only one case has a result, so that no change is known."
         return one if n_known else "No case has a result."
-    if np.count_nonzero(table.has_settled) == 1:
-        return f"Only one of {n_known} cases settled, so that no change is known."
     if not analysis.ranges:
+        if np.count_nonzero(table.has_settled) == 1:
+            return f"Only one of {n_known} cases settled, so that no change is known."
         return f"No main measure of {n_known} cases changes by more than its error."
 
     first, *others = analysis.ranges
@@ -60,7 +59,7 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
             clauses.append(f"{_name_in_words(entry.measure)} {words}")
     changed = {entry.measure for entry in analysis.ranges}
     for name in filter(refine.is_main, table.measures):
-        if name not in changed and np.isfinite(table.select_trusted(name)).any():
+        if name not in changed and np.isfinite(table.select_trusted(name).values).any():
             clauses.append(f"{_name_in_words(name)} by no more than its error")
     text = f"{_name_in_words(first.measure)} {'; '.join(clauses)}."
     varied = [key for key in table.keys if key.count > 1]
@@ -73,8 +72,8 @@ def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRa
     With several keys, the largest total index of Sobol names the main one in place of where they lie.
     """
     name, *cases, _ = entry
-    column = table.measures[name]
-    round_off = VALUE_ROUND_OFF * np.nanmax(np.abs(column.values))
+    column = table.select_trusted(name)
+    round_off = VALUE_ROUND_OFF * np.nanmax(np.abs(column.values), initial=0.0)
     ends = [0.0 if abs(column.values[case]) <= round_off else column.values[case] for case in cases]
     low, high = (_format_measure(name, column.unit, end) for end in ends)
     varied = [key for key in table.keys if key.count > 1]
@@ -194,7 +193,7 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
         "not converged": cases["outcomes"].get(Outcome.NOT_CONVERGED, 0),
     }
     n_unsettled = cases["count"] - int(table.has_settled.sum()) - sum(counts.values())
-    counts[f"unsettled{_describe_unsettled(table)}"] = n_unsettled
+    counts[f"unsettled{_describe_unsettled(table, analysis)}"] = n_unsettled
 
     # Of the measures that miss the tolerance, the one that does so in most cases is named.
     missed = cases["over_tolerance"]
@@ -225,8 +224,18 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
     return f"{len(table)} case{'s' * (len(table) > 1)}: {', '.join(clauses)}.{advice}"
 
 
-def _describe_unsettled(table: SweepTable) -> str:
-    """Return the largest amplitude of unsettled cases in brackets if it is above that of all others."""
+def _describe_unsettled(table: SweepTable, analysis: SweepAnalysis) -> str:
+    """Return for how many unsettled cases steady estimates count.
+
+    Without one, return their largest amplitude in brackets if it is above that of all others.
+    """
+    n_steady = 0
+    for name in (entry.measure for entry in analysis.ranges):
+        if f"{name}_steady" in table.measures:
+            is_known = np.isfinite(table.select_trusted(name).values) & ~table.has_settled
+            n_steady = max(n_steady, int(np.count_nonzero(is_known)))
+    if n_steady:
+        return f" (of which {n_steady} with a steady estimate that counts)"
     name = MAIN_MEASURES[0]
     if name not in table.measures:
         return ""

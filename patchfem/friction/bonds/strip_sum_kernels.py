@@ -87,7 +87,15 @@ class Term(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def mix(first, last, fraction):
-    """Interpolate linearly between the values `first` at the fraction 0 and `last` at the fraction 1."""
+    """Interpolate linearly between two values.
+
+    Parameters
+    ----------
+    first, last : float
+        Values at the fractions 0 and 1.
+    fraction : float
+        Fraction at which the result is the value.
+    """
     return first + fraction * (last - first)
 
 

@@ -94,8 +94,8 @@ def _solve_group(
         except Exception as error:
             # without a number, so that the same fault of many groups is one warning of a sweep
             faults.append(
-                "cases are run one by one, because running them together failed with an internal fault, please report "
-                f"it: {type(error).__name__}: {error}"
+                "cases are run one by one, because running them together failed with an internal fault; please report "
+                f"this fault: {type(error).__name__}: {error}"
             )
             if report is not None:
                 report(faults[0])

@@ -17,7 +17,12 @@ from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds.parameters import Bonds
 from ...friction.record import make_law
 from ...measures import rows
-from ...measures.errors import ERROR_MEASURES, combine_errors, estimate_convergence_errors
+from ...measures.errors import (
+    ERROR_MEASURES,
+    combine_errors,
+    estimate_convergence_errors,
+    include_phase_error,
+)
 from ...measures.outcome import (
     AMPLITUDE_ROUND_OFF,
     describe_ringing,
@@ -44,6 +49,7 @@ from ...measures.settling import (
 )
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns, select_models
+from ...motion_measures import ratio_or_zero
 from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, POINT_LAWS, list_point_law
 from ...points.rows import Cases, Law, LawNumber, Number
@@ -55,12 +61,14 @@ from . import one_by_one
 from .case_results import CaseResults, CodedColumn, has_unreadable_measurements
 
 BATCH_ENGINE = "points"  # name of the engine in the settings of a case
-# Longest steps per cycle of successive marches of smooth laws
-BATCH_STEPS_PER_CYCLE = (20, 40, 80, 160, 320, 640)
-BATCH_ORDER = 4.0  # order of convergence of these marches
-# Part of the mean square of the relative errors of a case that is added to the error of each of its measures
-POOLED_ERROR = 0.5
+# Longest steps per cycle of successive marches of smooth laws. With 20 steps the error of some motions is up to a hundred
+# times that with 40 steps, so that the change between the two would not show the order of convergence.
+BATCH_STEPS_PER_CYCLE = (28, 40, 56, 80, 112, 160, 224, 320, 448, 640)
+BATCH_STEP_RATIO = 2**0.5  # ratio of the steps of two successive marches
+# Factor between the errors of two successive marches, whose order of convergence is 4, as a power of 2
+BATCH_ORDER = 2.0
 DRIFT = "drift_per_cycle"  # name of the measure, which is the difference of two cycles
+DISTORTION = "acceleration_distortion"  # name of the measure
 # Measures whose error is not relative to their value
 UNPOOLED_MEASURES = {DRIFT, *ERROR_MEASURES}
 EXACT_STEPS_PER_CYCLE = 16  # steps of laws that are linear between events, which are exact
@@ -317,6 +325,17 @@ def find_size(name: str, values: dict[str, np.ndarray]) -> np.ndarray:
     return np.fmax(np.abs(values[name]), find_larger_term(name, values))
 
 
+def find_distortion_size(group: Group, values: dict[str, np.ndarray]) -> np.ndarray:
+    """Return the acceleration (n,) of the output by the largest friction force, relative to its first harmonic.
+
+    The third harmonic of the acceleration is that of the friction force, most of which cancels in it. `values` (n,) are
+    all measures of the cases by name.
+    """
+    push = values["friction_force_peak"] * group.read(Number.MOBILITY)
+    push *= np.abs(group.read(Number.OUTPUT))
+    return ratio_or_zero(push, values["absolute_acceleration_fundamental"])
+
+
 def estimate_errors(
     group: Group, march: CaseMarch, coarser: Sequence[dict[str, np.ndarray]]
 ) -> dict[str, np.ndarray]:
@@ -329,7 +348,7 @@ def estimate_errors(
     march : CaseMarch
         March of the cases.
     coarser : sequence of dict
-        Values (n,) by name of marches with half the steps of the one before.
+        Values (n,) by name of the marches before, from fine to coarse.
     """
     fine = march.values
     repeat_error = find_repeat_error(group, march)
@@ -338,23 +357,24 @@ def estimate_errors(
             fine, *coarser, order=BATCH_ORDER, max_order=BATCH_ORDER
         )
         # Two cycles differ by less than the errors of their events, so that a drift has no order of its own.
-        errors |= estimate_convergence_errors(*({DRIFT: run[DRIFT]} for run in (fine, *coarser)))
+        drifts = ({DRIFT: values[DRIFT]} for values in (fine, *coarser))
+        errors |= estimate_convergence_errors(*drifts, ratio=BATCH_STEP_RATIO)
 
-        # A change that is small by accident does not give an error far below those of the other measures, relative to
-        # the value of a measure or to the terms of a difference.
+        # A change that is small by accident does not give an error below the root mean square of those of all measures,
+        # relative to the value of a measure or to the terms of a difference.
         names = errors.keys() - UNPOOLED_MEASURES
         sizes = {name: find_size(name, fine) for name in names}
+        sizes[DISTORTION] = np.fmax(sizes[DISTORTION], find_distortion_size(group, fine))
         parts = np.array([errors[name] / sizes[name] for name in names])
         is_changed = parts > MEASURE_CHANGE_ROUND_OFF
         squares = np.where(is_changed & (parts < 1), parts, 0.0) ** 2
-        mean = squares.sum(axis=0) / np.fmax(np.sign(squares).sum(axis=0), 1)
-        pooled = POOLED_ERROR * np.sqrt(mean)
+        pooled = np.sqrt(squares.sum(axis=0) / np.fmax(np.sign(squares).sum(axis=0), 1))
         for name, part in zip(names, pooled * is_changed):
-            errors[name] += part * sizes[name]
+            errors[name] = np.fmax(errors[name], part * sizes[name])
         for name, error in errors.items():
             left_out = march.repeat if name == DRIFT else repeat_error
             errors[name] = combine_errors(name, fine, [error], left_out)
-        return errors
+        return include_phase_error(errors)
 
 
 def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarray]:
@@ -394,7 +414,7 @@ def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarra
     with np.errstate(all="ignore"):
         ratio = np.abs(values["equivalent_damping"] / values["loop_area"])
         errors["equivalent_damping"] += ratio * work
-    return errors
+    return include_phase_error(errors)
 
 
 def has_closed_form(group: Group) -> np.ndarray:

@@ -59,6 +59,8 @@ def solve(
         else:
             results.put(case, result.outcome, result.measures, 0.0)
             results.numerics[case] = collect_used_settings(result)
+
+            # The warnings of a run that found no motion are all that it found
             findings = [finding.sentence for finding in result.findings]
             if result.outcome is Outcome.NOT_CONVERGED:
                 findings = result.warnings

@@ -74,12 +74,13 @@ def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
     `model` is one of the models, with the texts that all of them have in common.
     """
     patch = model.patch
+    is_solved = batch.outcome != OutcomeCode.FAILED
     counts = batch.facts[MeshFact.N_NODES]
     for count in np.unique(counts):
         results.numerics[counts == count] = {"interface_nodes": int(count)}
     reason = "; or ".join(measures.list_unbounded_pressure_reasons(patch))
     for name in measures.PRESSURE_PEAK_MEASURES:
-        is_unbounded = np.isnan(batch.values[name]) & (batch.outcome != OutcomeCode.FAILED)
+        is_unbounded = np.isnan(batch.values[name]) & is_solved
         if is_unbounded.any():
             row = PATCH_TABLE[name]
             missing = Measure(None, row.unit, None, row.floor, reason=reason)
@@ -91,8 +92,8 @@ def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
     notes = shorten_file_names(model.source.notes, path)
     if assumption := measures.describe_assumed_plane_state(patch.pieces):
         notes.append(f"{assumption}; the run of a single case states how much the two differ")
-    results.warnings[batch.outcome != OutcomeCode.FAILED] = warnings
-    results.notes[batch.outcome != OutcomeCode.FAILED] = notes
+    results.warnings[is_solved] = warnings
+    results.notes[is_solved] = notes
 
     # Those of single cases; if the largest pressure and approach cause none, no other case has any.
     peak = measures.PRESSURE_PEAK_MEASURES[0]
@@ -107,7 +108,8 @@ def _insert_texts(model: Model, batch: Batch, results: CaseResults) -> None:
         or strength.note_on_yielding_faces(patch, certain.max())
         or result.note_on_coupling(coupling.max())
     ):
-        is_own[:] = batch.outcome != OutcomeCode.FAILED
+        is_own = is_solved
+
     for case in np.flatnonzero(is_own).tolist():
         own = result.warn_of_strains(patch, peaks[case], approaches[case])
         if batch.facts[MeshFact.STEEP_END, case]:
@@ -130,6 +132,7 @@ def _insert_findings(model: Model, batch: Batch, results: CaseResults) -> None:
 
     is_missed = (ratios > 1).any(axis=0) & (batch.outcome != OutcomeCode.FAILED)
     for case in np.flatnonzero(is_missed).tolist():
+        # What misses, as for a single run, whose advice depends on why its mesh is no finer
         excess = {name: ratio for name, ratio in zip(names, ratios[:, case]) if ratio > 1}
         missed = {}
         for name in excess:

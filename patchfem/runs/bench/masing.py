@@ -73,6 +73,7 @@ def follow_masing(find_loop, limit: float, slide) -> MasingHistory:
         direction = float(np.sign(slide[end] - slide[begin]))
         ratio = 2.0 if branches else 1.0
         branches.append(_Branch(slide[begin], values[0, begin], direction, ratio))
+
         # Slip, work and loss up to the start of the branch; its force is not a sum.
         before = values[:, begin] * [0, 1, 1, 1]
         first = begin + 1

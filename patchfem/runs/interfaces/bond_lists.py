@@ -97,19 +97,23 @@ def choose_bond_summation(model: Model, numerics):
         keys = interface.numbers
         if not sums_over_lists(model, keys):
             continue
+
+        # Amplitude of the block relative to the bond length: that of free motion, or that of bonds which hold it
         amplitude = (
             model.speed_scale
             / structure.drive_sizes.find_drive_omega(drive.signal)
             / keys.bond_length
         )
+        if keys.reading != "report" and drive.kind != "free":
+            holding = _find_holding_ratio(model, number)
+            amplitude = min(amplitude, 1 / holding if holding >= MIN_STUCK_FORCE_RATIO else inf)
+
+        # Late strokes of a motion that decays are much shorter, and need narrow strips.
         ratio = 1.0
         if is_stuck_by_printed_law(model, number):
             ratio = STICKING_STROKE_RATIO
         elif drive.kind == "free" or drive.waveform.is_step:
             ratio = DECAYED_STROKE_RATIO
-        if keys.reading != "report" and drive.kind != "free":
-            holding = _find_holding_ratio(model, number)
-            amplitude = min(amplitude, 1 / holding if holding >= MIN_STUCK_FORCE_RATIO else inf)
         stroke = max(4 * ratio * amplitude, MIN_STROKE)
         choices.append(
             _choose_sum(model, keys, model.accuracy.tolerance, stroke, numerics.steps / 2)

@@ -235,6 +235,8 @@ def _place_on_lower_piece(joint: Joint, limits) -> contacts.LowerPressure | None
     is_below = patch is not None and patch.model.gap.side == "lower"
     if not is_below or joint.model.grooves is not None or joint.band is not None:
         return None
+
+    # A law that averages the pressure limits friction by its tractions of either sign.
     x = patch.x
     area = patch.pieces.interface
     pressures = [patch.pressure.sigma_n]
@@ -372,6 +374,8 @@ def compute_point_fields(patch, contact, snapshots) -> tuple[np.ndarray, np.ndar
     tau = np.zeros((len(snapshots), patch.x.size))
     if not len(snapshots):
         return tau, tau
+
+    # Points of shear modes are at some of the nodes.
     index = np.arange(patch.x.size)
     if contact.reduction is not None:
         index = np.concatenate([point_set.shear.points for point_set in contact.first_sets])

@@ -321,6 +321,8 @@ def with_face_measures(
     if errors and n_edge_sides:
         by_edge = edge_errors(*series)
         errors |= {name: by_edge[name] for name in EDGE_MEASURES}
+
+    # An edge of contact is known to a part of a cell, and no difference to less than its terms.
     larger_terms = list_larger_terms(values, pieces.length / 2, pieces.width / 2)
     edge_error = MIN_CONTACT_EDGE_ERROR_IN_CELLS * n_edge_sides / active.size
     if may_open_between_cells(patch.pressed.pressure):

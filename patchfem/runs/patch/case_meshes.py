@@ -2,7 +2,7 @@
 
 In: a `PatchModel` whose loading and gap shapes may contain arrays, and a tolerance. Out: a `Batch`. The cases are pressed
 together on nested meshes. Those that miss the tolerance go on with the next mesh. When this would be too expensive, they
-are divided by the ends of their contacts, and each part gets meshes that are graded to its own contacts. A case
+get meshes that are graded to their own contacts; many of them are divided by the ends of their contacts before. A case
 that is alone ends with its tolerance or with the limit of the mesh of a single run.
 """
 
@@ -35,6 +35,12 @@ MAX_SEARCHED_CASES = 256
 MAX_SEARCHES = 3
 # Largest number of interface nodes of meshes that many cases share; a finer mesh slows down every case
 MAX_SHARED_NODES = 500
+# Number of nested meshes of many cases. The first one has cells twice as long as that of a single run, so that the finest of
+# four takes the time of that of three, while errors of limits from four values are half as large
+N_CASE_MESHES = 4
+# Largest part of the cases of a mesh, and number of them, that get one further mesh; more of them get two
+MAX_SHARE_OF_ONE_GROUP = 1 / 3
+MAX_CASES_OF_ONE_GROUP = 40
 MAX_CHUNK_VALUES = 4_000_000  # numbers of a temporary array of cases, columns and nodes, 32 MB
 # Error of the centre of a contact on a mesh for many contacts, in cell lengths: an end lies anywhere in its cell, and half
 # of its position error remains. In 280 random crowned blocks, it was at most 0.0061 where the changes between meshes are
@@ -185,22 +191,29 @@ class _CaseSolver:
         groups = [(OpenCases(numbers, search.guess_places(), []), layout)]
         while groups:
             cases, layout = groups.pop()
-            missing = self._refine(cases, grids.make_grids(self.patch_model, layout))
+            fine = grids.make_grids(self.patch_model, layout)
+            missing = self._refine(cases, [grid.coarsen() for grid in fine])
             # A case that is alone has reached the limit of the mesh
             if missing.size and cases.numbers.size > 1:
-                groups += self._divide(missing)
+                groups += self._regroup(missing, cases.numbers.size)
 
-    def _divide(self, numbers: np.ndarray) -> list[tuple[OpenCases, Layout]]:
-        """Divide cases (k,) into two groups whose contacts end at similar places, with the columns of their meshes."""
+    def _regroup(self, numbers: np.ndarray, n_before: int) -> list[tuple[OpenCases, Layout]]:
+        """Return groups of cases (k,) that miss the tolerance on a mesh, with the columns of their next meshes.
+
+        Two groups have contacts that end at similar places. A small part of the `n_before` cases of a mesh stays together,
+        because a mesh for its contacts alone is much finer there.
+        """
         spans = np.array([self.contacts[number].extents[0].span for number in numbers.tolist()])
         side = np.ptp(spans, axis=0).argmax()
-        order = np.argsort(spans[:, side], kind="stable")
+        numbers = numbers[np.argsort(spans[:, side], kind="stable")]
+        n_most = min(MAX_SHARE_OF_ONE_GROUP * n_before, MAX_CASES_OF_ONE_GROUP)
+        n_groups = 1 if numbers.size <= n_most else 2
         groups = []
-        for rows in filter(len, np.array_split(order, 2)):
-            spread = np.linspace(0, rows.size - 1, min(rows.size, MAX_GRADED_CONTACTS))
-            graded = numbers[rows[spread.round().astype(int)]].tolist()
+        for part in filter(len, np.array_split(numbers, n_groups)):
+            spread = np.linspace(0, part.size - 1, min(part.size, MAX_GRADED_CONTACTS))
+            graded = part[spread.round().astype(int)].tolist()
             layout = grids.make_common_layout([self.contacts[number] for number in graded])
-            groups.append((OpenCases(numbers[rows], None, []), layout))
+            groups.append((OpenCases(part, None, []), layout))
         return groups
 
     def solve_on_given_meshes(self) -> None:
@@ -225,6 +238,8 @@ class _CaseSolver:
         """
         max_nodes = MAX_SHARED_NODES if cases.numbers.size > 1 else np.inf
         nested = mesh_levels.NestedMeshes(self.patch_model, given, max_nodes)
+        if self.patch_model.mesh.is_automatic:
+            nested.n_needed = N_CASE_MESHES
 
         def press(bodies, before: mesh_levels.SolvedMeshes | None) -> mesh_levels.SolvedMeshes:
             """Press the cases that the meshes before have left."""
@@ -254,6 +269,8 @@ class _CaseSolver:
         level = make_level(self.patch_model, pair)
         goes_on = np.ones(numbers.size, bool)
         parts = []
+
+        # A case that cannot be pressed, or that meets its tolerance, is not pressed on the next mesh.
         for rows in _split_rows(numbers.size, level):
             part = before.take(rows)
             start = np.zeros((rows.size, level.x.size), bool)
@@ -261,6 +278,8 @@ class _CaseSolver:
                 start = part.places.find_sets(level.x)
             pressed, errors = press_on_level(level, self.cases.take(part.numbers), start)
             values = collect_mesh_values(pressed)
+
+            # Contacts of the cases that go on grade the meshes of their groups.
             if is_judged:
                 series = [*part.series, values]
                 goes_on[rows] = self._keep_measures(part.numbers, pressed, series, errors)
@@ -270,8 +289,10 @@ class _CaseSolver:
             for row, error in errors.items():
                 goes_on[rows[row]] = False
                 self.batch.fail(int(part.numbers[row]), error)
+
             parts.append((values, find_contact_places(pressed)))
             level.limit_sets(MAX_TABLE_SETS)
+
         values, places = zip(*parts)
         series = [*before.series, join_mesh_values(values)]
         return OpenCases(numbers, join_places(places), series).take(goes_on)
@@ -293,19 +314,25 @@ class _CaseSolver:
         mesh = self.patch_model.mesh
         length = self.patch_model.pieces.length
         tolerance = self.tolerance if mesh.is_automatic else None
-        estimates = estimate_static_measures(pressed, series, tolerance, CENTRE_ERROR_IN_CELLS)
-        excess = estimates.excess(self.tolerance, length)
-        found = CaseMeasures(
-            estimates.names,
-            estimates.values,
-            estimates.errors,
-            estimates.floors(self.tolerance, length),
-            excess,
-            collect_facts(pressed),
-        )
         is_solved = np.ones(len(pressed), bool)
         is_solved[list(errors)] = False
-        self.batch.put(numbers[is_solved], found.take(is_solved))
+        excess = np.full(len(pressed), np.inf)
+        # The errors that three meshes give hold as well as those with a coarser one, which are larger or smaller
+        for used in (series[-grids.MIN_NESTED_MESHES :], series):
+            estimates = estimate_static_measures(pressed, used, tolerance, CENTRE_ERROR_IN_CELLS)
+            own_excess = estimates.excess(self.tolerance, length)
+            found = CaseMeasures(
+                estimates.names,
+                estimates.values,
+                estimates.errors,
+                estimates.floors(self.tolerance, length),
+                own_excess,
+                collect_facts(pressed),
+            )
+            self.batch.put(numbers[is_solved], found.take(is_solved))
+            excess = np.minimum(excess, own_excess)
+            if excess.max() <= 1 or len(used) == len(series):
+                break
         return excess > 1
 
 

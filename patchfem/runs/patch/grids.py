@@ -527,6 +527,8 @@ def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     while x.size > MAX_GRID_COLUMNS + 1 and layout.bands:
         layout = layout.scale_cells(x.size / MAX_GRID_COLUMNS)
         x = divide_into_columns(layout, nodes)
+
+    # Both pieces have the same columns, and each has rows of its own.
     first_row = float(np.diff(x).min())
     length = patch_model.pieces.length
     growth = choose_density(patch_model).cell_growth

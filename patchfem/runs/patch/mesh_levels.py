@@ -268,6 +268,8 @@ class _PatchMeshes(NestedMeshes):
                 if coarse is None:
                     raise
                 return None
+
+        # Fewer meshes than the error needs are followed by another one.
         patches = (patch, *patches)
         excess = inf if len(patches) < self.n_needed else 0.0
         if len(patches) >= MIN_NESTED_MESHES:

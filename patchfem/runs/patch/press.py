@@ -458,6 +458,8 @@ def _make_patch(pressed: PressedCases) -> Patch:
     if level.is_smooth:
         level = level.linearise(pressed.layer[0])
     pieces = level.pieces
+
+    # Compliance of a slipping node: that of the pieces, if they shear, of the layer, and of the holder
     slip_compliance = pieces.tangential
     if not patch_model.interface.has_shear:
         slip_compliance = slip_compliance - pair.compliance.tangential

@@ -18,6 +18,7 @@ from ...elasticity.lapack import use_one_blas_thread
 from ...elasticity.sides import BlockShape
 from ...model import profile
 from ...model.pieces import make_layer_stacks
+from ..refine import NO_LIMIT, Verdict, refine
 from ..results.patch_rows import HALF_SPACE_SOURCE, Measures, Values, make_measure
 from .area import make_contact_state, make_loading
 from .measures import (
@@ -99,30 +100,38 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     PointSolution or None
         None if fewer than MIN_POINT_LEVELS levels are solved.
     """
-    count = _count_first_level_points(patch_model)
-    solution = None
-    with use_one_blas_thread():
-        try:
-            # Finer bricks of the free ends on the coarsest points, then the last of them on more and more points
-            end_levels = [_solve_level(patch_model, level, count) for level in SIDE_LEVELS]
+    end_levels: list[PointLevel] = []
 
-            # The points are doubled until the tolerance is met.
-            point_levels = end_levels[-1:]
-            while solution is None or not (
-                meets_tolerance(solution) or _is_next_level_expensive(point_levels[-1])
-            ):
-                pressure = point_levels[-1].surface.sigma_n
-                point_levels.append(
-                    _solve_level(patch_model, SIDE_LEVELS[-1], 2 * pressure.size, pressure)
-                )
-                if len(point_levels) >= MIN_POINT_LEVELS:
-                    estimates = _combine_refinement_series(end_levels, point_levels)
-                    solution = PointSolution(
-                        estimates, point_levels[-1].surface, point_levels[-1].intervals
-                    )
+    def solve(count: int, coarser: list[PointLevel] | None) -> list[PointLevel] | None:
+        """Solve the patch on more points, after the levels with fewer; None if the solver does not converge."""
+        try:
+            if coarser is None:
+                # Finer and finer bricks of the free ends on the coarsest points
+                end_levels[:] = [_solve_level(patch_model, level, count) for level in SIDE_LEVELS]
+                return end_levels[-1:]
+            pressure = coarser[-1].surface.sigma_n
+            return [*coarser, _solve_level(patch_model, SIDE_LEVELS[-1], count, pressure)]
         except (NotConverged, np.linalg.LinAlgError):
-            pass
-    return solution
+            return None
+
+    def make_solution(levels: list[PointLevel]) -> PointSolution | None:
+        """Return the measures on the finest points; None if too few levels show no order of convergence."""
+        if len(levels) < MIN_POINT_LEVELS:
+            return None
+        estimates = _combine_refinement_series(end_levels, levels)
+        return PointSolution(estimates, levels[-1].surface, levels[-1].intervals)
+
+    def judge(levels: list[PointLevel], excesses: list[float]) -> Verdict:
+        """Double the points until the tolerance is met, or the next level is expensive."""
+        solution = make_solution(levels)
+        is_last = solution is not None and (
+            meets_tolerance(solution) or _is_next_level_expensive(levels[-1])
+        )
+        return Verdict(0.0, None if is_last else 2 * levels[-1].surface.x.size)
+
+    with use_one_blas_thread():
+        levels, _ = refine(solve, _count_first_level_points(patch_model), judge, NO_LIMIT)
+    return None if levels is None else make_solution(levels)
 
 
 def _count_first_level_points(patch_model) -> int:

@@ -177,10 +177,12 @@ def assemble_static_values(
     dict
         In SI units.
     """
+    # Ratios to the load are 0 without it.
     is_loaded = state.load > 0
     load = np.where(is_loaded, state.load, 1.0)
     total = np.where(is_loaded, area * peak, 1.0)
     fraction = edge_values.length / length
+
     values = {
         "normal_load": state.load,
         "contact_fraction": fraction,
@@ -195,6 +197,8 @@ def assemble_static_values(
         "tangential_stiffness": edge_values.tangential,
         "rotational_stiffness": edge_values.rotational,
     }
+
+    # Only a face has measures across its width.
     if across is not None:
         values |= {
             "contact_area": fraction * area,

@@ -5,7 +5,7 @@ the numerical settings of the run.
 """
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import field
 from pathlib import Path
 from types import MappingProxyType
@@ -91,16 +91,14 @@ class Shortage(NamedTuple):
 
 @array_dataclass
 class RunInputs:
-    """Inputs of a run: plan, pressed interfaces, callbacks and whether to estimate errors.
+    """Inputs of a run: plan, pressed interfaces, and the limits and callbacks of its caller.
 
     - plan: Plan to run.
     - faces: pressed interfaces (`interfaces.Face`), with their worn surfaces.
     - seconds: CPU seconds by step of the run; the run adds its own.
     - warnings, notes: sentences on the scene and the patch.
-    - say, progress: callbacks for a line of text and for the completed fraction, or None.
-    - estimate: whether to estimate the errors from coarser runs.
+    - control: `refine.RunControl`, what the caller has set.
     - stiffer: rig and patch with a stiffer joint, if a joint was subtracted from the modes; else None.
-    - limit: `refine.RunLimit` of the run.
     """
 
     plan: object
@@ -108,10 +106,7 @@ class RunInputs:
     seconds: Values
     warnings: list[str]
     notes: list[str]
-    limit: object
-    say: Callable[[str], None] | None = None
-    progress: Callable[[float], None] | None = None
-    estimate: bool = True
+    control: object
     stiffer: object = None
 
     @property

@@ -5,6 +5,7 @@ lists and rules hold for all engines and for a prescribed slide. Runs in time st
 compared with a run that has as many.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -86,9 +87,8 @@ def list_space_runs(
     """
     engine = ENGINES[numerics.engine]
     rig = model.rig
-    reduction = getattr(solution.contact, "reduction", None)
     # Shear modes of the run; parallel elements have no shape.
-    n_modes = int(np.size(reduction.stiffness)) if hasattr(reduction, "shape") else None
+    n_modes = _count_shear_modes(solution)
     beside = divide_steps(numerics, 4) if engine.has_steps else None
     base = beside or numerics
     coarser_runs = []
@@ -104,18 +104,10 @@ def list_space_runs(
         # The measures of bands have the error of the trapezoidal rule with 400 samples per cycle.
         add("samples", estimate_sampling_errors)
 
-    # The patch of [contact] on coarser meshes, with the same number of shear modes, so that only the mesh changes. The
-    # order of the cells of a face in time steps is at least 1.
+    # The patch of [contact] on coarser meshes, with the same number of shear modes, so that only the mesh changes.
     is_averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
     if n_coarse and (model.motion_depends_on_mesh or is_averaged):
-        has_elements = bool(model.partial_slip) and n_modes is None
-        rule = _choose_mesh_rule(model.side, has_elements=has_elements)
-        has_cells = model.patch is not None and model.patch.area is not None and beside is not None
-        if has_cells and rule is second_order_errors:
-            rule = estimate_convergence_errors
-        # A second coarser mesh shows the order. The elements of a rig have one, as those between masses.
-        is_single = rule is second_order_errors or (has_elements and rig is not None)
-        n_meshes = 1 if is_single or beside is None else 2
+        rule, n_meshes = _choose_patch_meshes(model, n_modes, has_steps=beside is not None)
         modes = numerics.shear_modes if n_modes is None else n_modes
         levels = range(1, 1 + min(n_coarse, n_meshes))
         add("mesh", rule, *({"coarse_patch": k, "shear_modes": modes} for k in levels))
@@ -146,12 +138,7 @@ def list_space_runs(
     if choice is not None and choice.find_error(ledger.get("join_error", 0.0)):
         add("bonds", partial(_bound_bond_errors, model, patch, solution, choice))
         if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
-            finer = replace(
-                choice,
-                merge=COMPARISON_MERGE_WIDTH_FACTOR * choice.merge,
-                tail=COMPARISON_TAIL_FACTOR * choice.tail,
-            )
-            narrow = replace(base, choice=finer)
+            narrow = replace(base, choice=_refine_bond_sum(choice))
             same = replace(base, choice=choice)
             coarser_runs.append(CoarserRuns((narrow,), estimate_errors_from_finer, same, "bonds"))
 
@@ -161,6 +148,37 @@ def list_space_runs(
         numbers = ({"other_rig": number} for number in range(len(others)))
         add("reduced", estimate_errors_from_finer, *numbers)
     return coarser_runs
+
+
+def _count_shear_modes(solution: Solution) -> int | None:
+    """Return the number of shear modes of a motion; None without modes. Parallel elements have no shape."""
+    reduction = getattr(solution.contact, "reduction", None)
+    return int(np.size(reduction.stiffness)) if hasattr(reduction, "shape") else None
+
+
+def _choose_patch_meshes(
+    model: Model, n_modes: int | None, *, has_steps: bool
+) -> tuple[Callable[..., Values], int]:
+    """Return the rule of the error by the mesh of [contact], and the number of coarser meshes that it uses.
+
+    The order of the cells of a face in time steps is at least 1. A second coarser mesh shows the order; the elements of a
+    rig have a single one, as those between masses.
+    """
+    has_elements = bool(model.partial_slip) and n_modes is None
+    rule = _choose_mesh_rule(model.side, has_elements=has_elements)
+    if model.area is not None and has_steps and rule is second_order_errors:
+        rule = estimate_convergence_errors
+    is_single = rule is second_order_errors or (has_elements and model.rig is not None)
+    return rule, 1 if is_single or not has_steps else 2
+
+
+def _refine_bond_sum(choice):
+    """Return the EngineChoice of the comparison run of a sum over bonds, with narrower strips and a smaller tail."""
+    return replace(
+        choice,
+        merge=COMPARISON_MERGE_WIDTH_FACTOR * choice.merge,
+        tail=COMPARISON_TAIL_FACTOR * choice.tail,
+    )
 
 
 def _choose_mesh_rule(side: str, *, has_elements: bool):

@@ -252,6 +252,7 @@ def add_mesh_errors(
     if any(moves):
         reason = CONTACTS_WITHOUT_STATIC_CURVE[moves.index(True)]
     else:
+        # Loops on the run's mesh and on coarser ones, where both have a static motion
         try:
             fine = make_laws_on_mesh(model, patch)
             mode_index = _find_nearest_mode(model.rig.modes, fine, curve.frequency[-1])
@@ -265,6 +266,7 @@ def add_mesh_errors(
             reason = str(error)
         except PatchfemError:
             reason = UNKNOWN_LOOP_REASON
+
     if reason:
         lacks = "no error of the mesh"
         if has_mesh_run:

@@ -147,6 +147,7 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
         rate = histories.modal_rate @ gauge
         return replace(histories, output=output, output_rate=rate, extra=histories.extra | sensor)
 
+    # The errors of the motion grow with its size.
     run = solution.run
     window = see(run.window)
     low, high = find_extremes(window.time, window.output, window.output_rate)
@@ -156,6 +157,7 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
     if steady is not None:
         error = ratio * steady.errors.get(AMPLITUDE, 0.0)
         steady = replace(steady, errors=steady.errors | {AMPLITUDE: error})
+
     values = solution.values | {AMPLITUDE: amplitude}
     values.pop(STEADY_AMPLITUDE, None)
     run = replace(run, response=see(run.response), window=window)

@@ -107,6 +107,8 @@ def _warn_of_peak(run) -> Iterator[str]:
     friction = run.model.friction
     if peak is None:
         return
+
+    # Without motion there is no peak.
     if run.measures[AMPLITUDE].value <= MAX_RESTING_SLIDE_RANGE:
         if friction is not None and law_has_trait(friction.law, "set-valued"):
             yield (
@@ -115,6 +117,8 @@ def _warn_of_peak(run) -> Iterator[str]:
                 "and a slider)"
             )
         return
+
+    # A peak inside the range is a resonance.
     drive = run.model.rig.drive.signal
     ends = {"drive.from": drive.low, "drive.to": drive.high}
     for key, end in ends.items():

@@ -248,7 +248,7 @@ class CoupledRun:
     def has_errors(self) -> bool:
         """Whether errors are estimated: the caller wants them, the motion was found, and all meshes for them exist."""
         is_solved = self.solution.run.outcome is not Outcome.NOT_CONVERGED
-        return self.inputs.estimate and is_solved and self.inputs.has_error_meshes
+        return self.inputs.control.estimate and is_solved and self.inputs.has_error_meshes
 
 
 def run_motion(inputs: RunInputs) -> Result:
@@ -302,31 +302,35 @@ def run_motion(inputs: RunInputs) -> Result:
         onset = levels.measure_onset_level(rig, found, run.coarser, model.accuracy.tolerance)
         run = replace(run, measures=run.measures | {"onset_level": onset})
     run = complete_measures(run)
-    decay = None
     if is_free and run.has_errors:
-        decay = decays.compute_decay_curve(run.solution, run.coarser)
-    if decay is not None:
-        space_runs = comparisons.list_space_runs(
-            model, run.numerics, run.patch, inputs.n_coarse, run.solution
-        )
-        has_mesh_run = any(one.source == "mesh" for one in space_runs)
-        decay, notes = decays.add_mesh_errors(
-            decay, model, inputs.patches, inputs.stiffer, has_mesh_run=has_mesh_run
-        )
-        run = replace(run, decay=decay, notes=notes)
+        run = _add_decay_curve(run)
     if run.has_friction and structure.drive_sizes.find_decay_rate(rig.modes) < 0:
         measures, notes = flutter.compute_flutter_amplitude(run)
         run = replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
     return replace(_make_result(run), shortage=shortage)
 
 
+def _add_decay_curve(run: CoupledRun) -> CoupledRun:
+    """Return the run of a release with its decay curve, and a note if the error by the mesh is unknown."""
+    decay = decays.compute_decay_curve(run.solution, run.coarser)
+    if decay is None:
+        return run
+    inputs = run.inputs
+    space_runs = comparisons.list_space_runs(
+        run.model, run.numerics, run.patch, inputs.n_coarse, run.solution
+    )
+    has_mesh_run = any(one.source == "mesh" for one in space_runs)
+    decay, notes = decays.add_mesh_errors(
+        decay, run.model, inputs.patches, inputs.stiffer, has_mesh_run=has_mesh_run
+    )
+    return replace(run, decay=decay, notes=notes)
+
+
 def _make_result(run: CoupledRun) -> Result:
     """Return the Result of a run whose measures are complete."""
     inputs = run.inputs
     model = run.model
-    rig = model.rig
-    solution = run.solution
-    motion = solution.run
+    motion = run.solution.run
     engine = ENGINES[run.numerics.engine]
 
     # Warnings and notes see the measures before their floors are raised to the tolerance.
@@ -336,31 +340,16 @@ def _make_result(run: CoupledRun) -> Result:
     if engine.finds_periodic_motion and run.outcome is Outcome.GROWS:
         measures = reasons.find_missing_unbounded(measures)
 
-    # What a motion has beside measures and histories
-    data = MotionData(step_runs=run.step_runs)
-    if rig is not None:
-        spectra = None
-        if rig.drive.waveform.is_random:
-            notes += stationary.warn_if_short(measures, motion.window)
-            spectra = stationary.compute_spectra(motion.window, rig.drive.signal)
-        found = solution.levels.levels if solution.levels is not None else ()
-        data = data._replace(
-            period=run.drive.period,
-            energies=motion.ledger,
-            levels=levels.convert_to_scene_units(rig, found),
-            events=motion.log,
-            decay=run.decay,
-            spectra=spectra,
-            steady=solution.steady and solution.steady.data,
-        )
+    if model.rig is not None and model.rig.drive.waveform.is_random:
+        notes += stationary.warn_if_short(measures, motion.window)
 
     # The fields of [contact], and those of the patches of [[structure.interface]].
     fields = {}
-    if inputs.patch is not None and rig is None:
+    if inputs.patch is not None and model.rig is None:
         fields = slides.collect_slide_frames(model, inputs.patch, motion.response)
     elif inputs.patch is not None:
         fields = interface_fields.collect_interface_fields(
-            model, run.numerics, inputs.patch, solution
+            model, run.numerics, inputs.patch, run.solution
         )
     faces = ()
     if model.has_interface_patches:
@@ -382,10 +371,33 @@ def _make_result(run: CoupledRun) -> Result:
         patch=inputs.patch,
         fields=fields,
         response=motion.response,
-        window=motion.response if rig is None else motion.window,
+        window=motion.response if model.rig is None else motion.window,
         settings=run.settings,
-        motion=data,
+        motion=_collect_motion_data(run),
         faces=faces,
+    )
+
+
+def _collect_motion_data(run: CoupledRun) -> MotionData:
+    """Return what a motion has beside its measures, histories and fields."""
+    data = MotionData(step_runs=run.step_runs)
+    rig = run.model.rig
+    if rig is None:
+        return data
+    solution = run.solution
+    motion = solution.run
+    spectra = None
+    if rig.drive.waveform.is_random:
+        spectra = stationary.compute_spectra(motion.window, rig.drive.signal)
+    found = solution.levels.levels if solution.levels is not None else ()
+    return data._replace(
+        period=run.drive.period,
+        energies=motion.ledger,
+        levels=levels.convert_to_scene_units(rig, found),
+        events=motion.log,
+        decay=run.decay,
+        spectra=spectra,
+        steady=solution.steady and solution.steady.data,
     )
 
 
@@ -438,26 +450,18 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
     rig = model.rig
     size = np.inf if rig is None else rig.displacement_scale
     stage = "bench" if rig is None else "march"
-    runner = Runner(
-        model, inputs.patches, inputs.stiffer, inputs.progress, is_single=not inputs.estimate
-    )
+    limit, say, progress, estimate = inputs.control
+    runner = Runner(model, inputs.patches, inputs.stiffer, progress, is_single=not estimate)
     n_frames = N_INTERFACE_FRAMES * (inputs.patch is not None or model.has_interface_patches)
-    first = runner.solve(numerics, inputs.say, n_frames)
+    first = runner.solve(numerics, say, n_frames)
     inputs.seconds.update({stage: first.seconds} | first.prepare)
 
-    # A belt moves on at constant speed, so that the drive has no period, but the stick-slip motion has one, which the first
-    # run shows. The window must contain a complete period, and the run two of them.
-    n_cycles = 0
-    drive = None if rig is None else rig.drive.signal
-    if rig is not None and model.friction is not None and drive.segments:
-        if not structure.drive_sizes.is_periodic(drive):
-            response = first.run.response
-            period = find_slip_period(response.time, response.slide_rate)
-            n_cycles = ceil(period / drive.period)
+    # The window must contain a complete period of the motion, and the run two of them.
+    n_cycles = _count_slip_cycles(model, first)
     if numerics.window < n_cycles <= numerics.cycles / 2:
         numerics = replace(numerics, window=n_cycles)
-        first = runner.solve(numerics, inputs.say, n_frames)
-    if not inputs.estimate or first.run.outcome is Outcome.NOT_CONVERGED:
+        first = runner.solve(numerics, say, n_frames)
+    if not estimate or first.run.outcome is Outcome.NOT_CONVERGED:
         measures = add_errors(first.values, size=size) | _find_peak_frequency(first)
         return CoupledRun(inputs, numerics, first, measures), None
 
@@ -475,7 +479,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
         if coarser is not None:
             # This run has twice the steps of the one before, with which it is compared.
             runner.solutions[coarser.numerics] = coarser.solution
-            solution = runner.solve(numerics, inputs.say, n_frames)
+            solution = runner.solve(numerics, say, n_frames)
             inputs.seconds[stage] = solution.seconds
         time_runs = comparisons.list_time_runs(numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
@@ -486,24 +490,52 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> tuple[CoupledRun, Shor
         run = CoupledRun(inputs, numerics, solution, measures, tuple(step_runs))
         if solution.levels is None and not runner.is_release:
             return run
+        return _add_coarser_runs(run, [*time_runs, *space_runs], runner.solutions)
 
-        # An entry without coarse runs is skipped if the errors of the levels already include it. Runs with another bond
-        # summation are not used for the errors of decay curves and onsets.
-        solved = runner.solutions
-        used_runs = [one for one in (*time_runs, *space_runs) if one.runs or not solution.steady]
-        pairs = []
-        for one in used_runs:
-            if one.runs and one.runs[0].choice is None:
-                pairs.append((solved[one.runs[0]], one.reference and solved[one.reference]))
-        if solution.levels is not None:
-            found = levels.add_level_errors(solution.levels, used_runs, solved)
-            solution = replace(solution, levels=found)
-        return replace(run, solution=solution, coarser=tuple(pairs))
-
-    run, shortage = refine.refine(solve, numerics, _judge, inputs.limit)
+    run, shortage = refine.refine(solve, numerics, _judge, limit)
     inputs.seconds["error"] = sum(solution.seconds for solution in runner.solutions.values())
     peak = _find_peak_frequency(run.solution, runner.solutions.values())
     return replace(run, measures=run.measures | peak), shortage
+
+
+def _count_slip_cycles(model, solution: Solution) -> int:
+    """Return the number of cycles of the drive in a period of stick-slip motion on a belt; 0 for other drives.
+
+    A belt moves on at constant speed, so that the drive has no period, but the motion has one, which a run shows.
+    """
+    if model.rig is None or model.friction is None:
+        return 0
+    drive = model.rig.drive.signal
+    if not drive.segments or structure.drive_sizes.is_periodic(drive):
+        return 0
+    response = solution.run.response
+    return ceil(find_slip_period(response.time, response.slide_rate) / drive.period)
+
+
+def _add_coarser_runs(run: CoupledRun, runs: ComparisonRuns, solved) -> CoupledRun:
+    """Return a run with the coarser runs from which the errors of its levels, decay curve and onset follow.
+
+    Parameters
+    ----------
+    run : CoupledRun
+        Run of a release or of a drive in levels.
+    runs : list of CoarserRuns
+        Its comparison runs.
+    solved : dict
+        Solution of each of them by its Numerics.
+    """
+    # An entry without coarse runs is skipped if the errors of the levels already include it. Runs with another bond
+    # summation are not used for the errors of decay curves and onsets.
+    solution = run.solution
+    used_runs = [one for one in runs if one.runs or not solution.steady]
+    pairs = []
+    for one in used_runs:
+        if one.runs and one.runs[0].choice is None:
+            pairs.append((solved[one.runs[0]], one.reference and solved[one.reference]))
+    if solution.levels is not None:
+        found = levels.add_level_errors(solution.levels, used_runs, solved)
+        solution = replace(solution, levels=found)
+    return replace(run, solution=solution, coarser=tuple(pairs))
 
 
 def _judge(run: CoupledRun, excesses: list[float]) -> refine.Verdict:

@@ -313,6 +313,8 @@ def compute_wear(
             moments = (wear.record(patch, state),)
         else:
             patch = solve_worn(patch, frozen_array(state.depth))
+
+        # Press, move and wear, jump by jump
         while state.cycle < n_cycles and find_worn_through_coating(model, state.depth) is None:
             state = wear.jump(state)
             patch = solve_worn(patch, frozen_array(state.depth))

@@ -533,8 +533,8 @@ class Drive(Table):
     )
     cycles: optional(
         Positive,
-        "length of the run, or of each level, in cycles of the drive; with kind 'free', in "
-        "cycles of the first mode that is not rigid, with a linear bonded spring and without an interlocking one",
+        "length of the run, or of each level, in cycles of the drive; with kind 'free', in cycles of the first mode whose "
+        "frequency is not 0 (linear bonded springs count, interlocking ones do not)",
     )
     duration: optional(
         Duration, "length of the run, or of each level, as a time; replaces `cycles`"

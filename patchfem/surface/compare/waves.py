@@ -22,6 +22,8 @@ MIN_BLOCK_WAVES = 2.0
 # Smallest length of a trace relative to the longest wave of the band
 MIN_TRACE_WAVES = 3.0
 MIN_STEPS_PER_WAVE = 4.0  # smallest length of the shortest wave of the band in steps
+# Shortest wave of the slope in steps. Interpolation between samples changes the slope of longer ones by less than 1 %.
+SHORTEST_SLOPE_WAVE_STEPS = 8.0
 RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
 # Power of the mean over sections that gives a size of the roughness.
 SECTION_MEAN_POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
@@ -34,9 +36,10 @@ def compare_waves(
 ) -> dict[str, Quantity]:
     """Compute the ratios of amplitude and slope, after divided by before, with their intervals.
 
-    Each line is levelled. The band is cut out by two Gaussian filters, and longer waves have no part in the slope. The
-    ends of tracks, whose flanks have all waves, do not count. The interval of the
-    logarithm follows from the scatter of the ratios of blocks, which aligned surfaces share.
+    Each line is levelled. The band is cut out by two Gaussian filters, and longer waves have no part in the slope. Waves
+    shorter than 8 steps have none either, because one of the surfaces is interpolated between its samples. The noise of
+    the slope is subtracted. The ends of tracks, whose flanks have all waves, do not count. The interval of the logarithm
+    follows from the scatter of the ratios of blocks, which aligned surfaces share.
 
     Parameters
     ----------
@@ -63,24 +66,28 @@ def compare_waves(
 
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
     lines = [_subtract_polynomial(line, 1) for line in lines]
-    # Deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off.
-    deviations = [(0.0, 0.187 * wave / step) for wave in WAVE_BAND]
+    waves = (*WAVE_BAND, SHORTEST_SLOPE_WAVE_STEPS * step)
+    # The deviation of the Gaussian filter of ISO 16610-21 is .187 of its cut-off.
+    deviations = [(0.0, 0.187 * wave / step) for wave in waves]
     lines = [z - smooth(z, deviations[1]) for z in lines]
     passed = [(smooth(z, deviations[0]) - smooth(z, deviations[1]))[:, is_kept] for z in lines]
-    slopes = [(np.diff(z, axis=1) / step)[:, is_kept[1:]] for z in lines]
+    slopes = [(np.diff(smooth(z, deviations[2]), axis=1) / step)[:, is_kept[1:]] for z in lines]
 
-    # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
-    band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / WAVE_BAND[0] - 1 / WAVE_BAND[1]))
+    # White noise of each surface in the band of the amplitude, and behind the filter of the slope.
+    white = noise / np.sqrt(2)
+    band_noise = white * np.sqrt(2 * step * (1 / WAVE_BAND[0] - 1 / WAVE_BAND[1]))
+    slope_noise = white / step * np.sqrt(1 / (4 * np.sqrt(np.pi) * deviations[2][1] ** 3))
     n_blocks = int(
         np.clip(length / (MIN_BLOCK_WAVES * WAVE_BAND[1]), MIN_RATIO_BLOCKS, MAX_RATIO_BLOCKS)
     )
     values = {}
-    errors = (band_noise, noise / step)
+    errors = (band_noise, slope_noise)
     for name, sizes, error in zip(RATIO_NAMES, (passed, slopes), errors):
         blocks = [_average_squares(np.array_split(size, n_blocks, 1)) for size in sizes]
         if _is_noise(error, blocks):
             values[name] = name_unknown(name, "noise")
             continue
+        blocks = [block - error**2 for block in blocks]
         values[name] = name_quantity(name, *_divide_means(*blocks, 0.5))
     return values
 

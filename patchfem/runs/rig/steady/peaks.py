@@ -284,15 +284,19 @@ def _find_vertex(x, y, k: int) -> _Vertex | None:
     near = slice(max(k - 1, 0), k + 2)
     if k in (0, x.size - 1) or not (y[near] > 0).all():
         return None
+
     distance = x - x[k]
     scale = np.abs(distance[near]).max()
     nearest = np.argsort(np.where(y > 0, np.abs(distance), np.inf))[:N_VERTEX_POINTS]
     used = np.union1d(np.arange(k - 1, k + 2), nearest)[: N_VERTEX_POINTS + 1]
     used = used[y[used] > 0]
+
     # Points that nearly coincide do not determine all coefficients; the fit then has the smallest ones, which is no defect.
     curve, _ = np.polynomial.Polynomial.fit(
         distance[used] / scale, (y[k] / y[used]) ** 2, used.size - 1, full=True
     )
+
+    # The vertex is the lowest minimum of the inverse squares between the neighbours of the highest point.
     roots = curve.deriv().roots()
     places = roots[np.isreal(roots)].real
     low, high = distance[near][[0, -1]] / scale

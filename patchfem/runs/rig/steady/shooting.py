@@ -83,6 +83,7 @@ class ShootingFinder:
         kernel_cache.report_compilation_to(say)
         self.joints = make_joints(model, self.numerics, patch)
         self.may_fold = may_fold(model)
+
         # The neighbours of a curve of Iwan's law are the better starts; undamped, its motion may have no bound.
         laws = [law for law, _ in self.joints.laws]
         have_elements = all(law.law == "masing" for law in laws)
@@ -537,7 +538,6 @@ class ShootingFinder:
             # Where the balance is too high, the highest motion may be in a part of the curve that it does not show. Points
             # a width apart cover all frequencies at which it is high enough.
             for side in sides:
-                before = top
                 for at, height in zip(omega[side], heights[side]):
                     highest = max(point.values[AMPLITUDE] for point in points)
                     if height < harmonic_balance.MIN_HEIGHT_RATIO * highest:
@@ -545,9 +545,8 @@ class ShootingFinder:
                     distances = [abs(point.drive.omega - at) for point in points]
                     if min(distances) >= MIN_SPACING_IN_WIDTHS * max(widths):
                         near = replace(sine, omega=float(at))
-                        start = before.guess.start
-                        before = self.compute_curve_point(near, start, needs_stability=False)
-                        points.append(before)
+                        start = periodic.Start(balanced.make_start(self.make_case(near)))
+                        points.append(self.compute_curve_point(near, start, needs_stability=False))
         return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
 
     def _follow_curve(self, drive) -> ResponseCurve:
