@@ -29,6 +29,7 @@ from .records import (
 from .runs import MESSAGES, Motion, run_case
 
 MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
+N_PIECES = 4  # number of pieces of its curve among its numbers
 
 N_FIRST_CYCLES = 8  # cycles before the first correction
 N_RELAXED = 6  # cycles without a correction after a search that failed, and twice as many after the next one
@@ -231,10 +232,13 @@ def follow_periodic_motion(
     tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
     before, change = shooting.converge(tolerance, N_RELAXED, MAX_KINKED_CHANGE)
 
-    # One more correction, after which the measured period begins nearer to the periodic motion
+    # One more correction, after which the change is a small part of it at the start of the measured period. From a start
+    # beyond its last reversal, where the force exceeds the friction limit, this period begins a period later.
     if shooting.map is not None:
         shooting.correct(before)
-        before = shooting.state
+        if shooting.is_possible():
+            shooting.relax(int(not shooting.follows_reversals(shooting.state)))
+            before = shooting.state
     return PeriodicMotion(
         run_case(shooting.whole, start=before),
         change,
@@ -523,9 +527,9 @@ class Shooting:
         return None
 
     def is_possible(self) -> bool:
-        """Return whether no law of reversal points remembers forces beyond its friction limit.
+        """Return whether no law of reversal points remembers forces beyond its friction limit, or below it of one element.
 
-        With such forces a loop far away from the motion would repeat itself.
+        With such forces a loop far away from the motion would repeat itself. One element reverses at its limit alone.
         """
         # Largest force at a reversal point after a correction, relative to the friction limit, which no motion exceeds;
         # corrections are exact to MAX_KINKED_CHANGE.
@@ -536,6 +540,9 @@ class Shooting:
             forces = memory[Memory.STACK + 1 : Memory.STACK + 2 * int(memory[Memory.COUNT]) : 2]
             limit = faces[i, Face.NUMBERS + masing.LIMIT]
             if np.abs(forces).max(initial=0.0) > max_force_ratio * limit:
+                return False
+            least = np.abs(forces).min(initial=np.inf)
+            if _has_single_element(faces[i]) and least * max_force_ratio < limit:
                 return False
         return True
 
@@ -690,6 +697,12 @@ class Shooting:
         step = _solve_newton(period_map, change, singular_tol) * period_map.scale
         packed[period_map.columns] = self.pack(before)[period_map.columns] + step
         self.state = self.unpack(self.state, packed)
+
+
+def _has_single_element(face) -> bool:
+    """Return whether the law of a row of the table of interfaces is one spring that slips at its limit."""
+    numbers = face[Face.NUMBERS :]
+    return numbers[1] == masing.TURNS_FREELY and numbers[N_PIECES] == 1
 
 
 class PeriodMap(NamedTuple):
