@@ -1219,6 +1219,7 @@ def compare(
     datum: str = "",
     predicted: str | Path | None = None,
     piece: str = "",
+    cutoff: float | None = None,
 ) -> dict[str, Any]:
     """Compare a measured surface before and after wear.
 
@@ -1243,6 +1244,8 @@ def compare(
         Results folder of a run with [wear], whose worn depth is compared with that of the traces.
     piece : str
         Piece on which the traces were measured, "upper" or "lower". Not required if both pieces wear equally.
+    cutoff : float or str, optional
+        Cut-off [m] of the roughness inside and outside of the track of traces. Default: the longest standard one that fits.
 
     Returns
     -------
@@ -1282,6 +1285,7 @@ def compare(
         shift=_parse_length(shift, "compare: shift"),
         datum=_require_string(datum, "compare: datum"),
         keep_spikes=keep_spikes,
+        cutoff=_parse_length(cutoff, "compare: cutoff"),
     )
     files = [_require_path(file, "compare") for file in files]
     _require_string(piece, "compare: piece")
@@ -1518,7 +1522,8 @@ class Plots:
     def curve(self, ax: Axes | None = None) -> Axes:
         """Plot the response curve: amplitude and acceleration of the steady motions against frequency or level.
 
-        With `ax`, only the amplitude is drawn, in the units of what the axes show already. The legend names the drive level.
+        With `ax`, only the amplitude is drawn. Each run adds a curve in a colour of its own, which the legend names by its
+        drive level. The axis is logarithmic if the levels differ by more than a decade.
         """
         no_curve = 'the run has no response curve; use drive.waveform = "sweep" with accuracy.method = "harmonic"'
         reason = self._explain_missing_motion() or no_curve
