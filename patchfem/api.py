@@ -1522,7 +1522,8 @@ class Plots:
     def curve(self, ax: Axes | None = None) -> Axes:
         """Plot the response curve: amplitude and acceleration of the steady motions against frequency or level.
 
-        With `ax`, only the amplitude is drawn, in the units of what the axes show already. The legend names the drive level.
+        With `ax`, only the amplitude is drawn. Each run adds a curve in a colour of its own, which the legend names by its
+        drive level. The axis is logarithmic if the levels differ by more than a decade.
         """
         no_curve = 'the run has no response curve; use drive.waveform = "sweep" with accuracy.method = "harmonic"'
         reason = self._explain_missing_motion() or no_curve

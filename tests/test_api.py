@@ -325,6 +325,38 @@ def test_always_every_chart_of_page_is_drawn_by_title(results, tmp_path):
             draw("none of these")
 
 
+def test_response_curves_of_several_levels_share_axes():
+    """Each level has a colour and an entry in the legend; the axis is logarithmic, in the unit of the largest one."""
+    scene = {
+        "structure": {
+            "moving_mass": "0.3 kg",
+            "mode": [{"name": "blade", "frequency": "200 Hz", "damping": 1e-3, "slide": 1.0}],
+        },
+        "friction": {"law": "elastic-plastic", "static": 0.35, "stiffness": "8 N/um"},
+        "normal": {"load": "8.83 N"},
+        "drive": {
+            "kind": "force",
+            "waveform": "sweep",
+            "from": "195 Hz",
+            "to": "205 Hz",
+            "rate": "1 Hz/s",
+        },
+        "accuracy": {"method": "harmonic", "tolerance": 1e-2},
+    }
+    results = [pf.run(scene, **{"drive.force": f"{force} N"}) for force in (1, 2, 4)]
+    axes = results[0].plot.curve()
+    assert axes.get_ylabel() == "amplitude [nm]"
+    small = axes.lines[0].get_ydata().max()
+    results[1].plot.curve(ax=axes)
+    assert axes.get_yscale() == "linear"
+    results[2].plot.curve(ax=axes)
+    assert (axes.get_ylabel(), axes.get_yscale()) == ("amplitude [um]", "log")
+    assert axes.lines[0].get_ydata().max() == pytest.approx(small * 1e-3)
+    assert len({line.get_color() for line in axes.lines}) == 3
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert names == ["drive 1 N", "drive 2 N", "drive 4 N"]
+
+
 def test_always_curve_on_axes_has_their_units():
     """A chart that is drawn on axes with values in a larger unit is drawn in this unit, with its own label kept."""
     panel = chart_panel.Panel(

@@ -6,6 +6,7 @@ search over the frequency. Seeds from 71_000_000 are used nowhere else.
 """
 
 import re
+from math import pi
 
 import numpy as np
 import pytest
@@ -101,6 +102,53 @@ method = "harmonic"
 tolerance = 1e-2
 """
     assert_peak_agrees(pf.load(text[: text.index("\n[drive]")] + drive))
+
+
+DAMPER = """
+[structure]
+moving_mass = "0.3 kg"
+mode = [{name = "blade", frequency = "200 Hz", damping = 0.001, slide = 1.0}]
+[friction]
+law = "elastic-plastic"
+static = 0.35
+stiffness = "8 N/um"
+[normal]
+load = "398 N"
+[drive]
+kind = "force"
+waveform = "sweep"
+from = "150 Hz"
+to = "1000 Hz"
+rate = "1 Hz/s"
+force = "2 N"
+[accuracy]
+method = "harmonic"
+tolerance = 1e-2
+"""
+
+
+@pytest.mark.parametrize(
+    "load", [0.34145488738336, 398.107170553497, 541.169526546464, 735.642254459641]
+)
+def test_peak_of_damper_that_hardly_slips(load):
+    """At the peak the drive does the work of damping and of a slip beyond the elastic range.
+
+    Friction reaches its limit there, without an error beyond that of the motion.
+    """
+    cases = pf.run_many(pf.load(DAMPER, **{"normal.load": f"{load} N"}))
+    limit = 0.35 * load
+    assert cases.values["friction_force_peak"][0] == pytest.approx(limit, rel=1e-9)
+    assert cases.errors["friction_force_peak"][0] < 1e-6 * limit
+
+    # 4 limit (x - range) + pi c omega x^2 = pi force x
+    amplitude, error = (
+        part["relative_displacement_amplitude"][0] for part in (cases.values, cases.errors)
+    )
+    omega = 2 * pi * cases.values["peak_frequency"][0]
+    linear = pi * 2.0 - 4 * limit
+    damping = pi * 2 * 0.001 * 0.3 * 2 * pi * 200 * omega
+    expected = (linear + (linear**2 + 16 * damping * limit * limit / 8e6) ** 0.5) / (2 * damping)
+    assert amplitude == pytest.approx(expected, rel=1e-4) and error < 1e-5 * amplitude
 
 
 def assert_peak_agrees(scene):

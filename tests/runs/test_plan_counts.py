@@ -77,3 +77,38 @@ def test_exact_probe_of_a_curve_names_the_curve():
     )
     text = " ".join(run_probe(plan(load(drive + '[accuracy]\nmethod = "harmonic"\n'))).sentences)
     assert "of it for the response curve" in text and "drive.cycles" not in text
+
+
+ELASTIC_BLOCK = """
+[structure]
+moving_mass = "0.3 kg"
+mode = [{name = "blade", frequency = "200 Hz", damping = 0.001, slide = 1.0}]
+[friction]
+law = "elastic-plastic"
+static = 0.35
+stiffness = "8 N/um"
+[normal]
+load = "20 N"
+[drive]
+kind = "force"
+waveform = "sweep"
+from = "150 Hz"
+to = "1000 Hz"
+rate = "1 Hz/s"
+force = "2 N"
+[accuracy]
+method = "harmonic"
+"""
+
+
+@pytest.mark.parametrize(
+    "values, words",
+    [
+        ({}, "may slip near 845.9 Hz, its natural frequency while it sticks"),
+        ({"drive.to": "700 Hz"}, "friction should hold the block"),
+        ({"drive.to": "700 Hz", "normal.load": "7 N"}, "may slip near 845.9 Hz"),
+    ],
+)
+def test_exact_elastic_interface_slips_near_resonance(values, words):
+    """Friction beyond the drive holds a block on an elastic interface, except near the resonance while it sticks."""
+    assert any(words in sentence for sentence in plan(load(ELASTIC_BLOCK, **values)).verdict)

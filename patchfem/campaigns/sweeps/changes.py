@@ -73,10 +73,9 @@ def analyse(table: SweepTable) -> SweepAnalysis:
         if name in table.measures:
             ranges += find_range(table, name)
     # of response curves, the height of the peak is what is asked for
-    is_curve = "peak_frequency" in table.measures
     ranges.sort(
         key=lambda entry: (
-            not (is_curve and entry.measure == "relative_displacement_amplitude"),
+            not (table.has_curves and entry.measure == "relative_displacement_amplitude"),
             -entry.relative,
         )
     )

@@ -145,6 +145,11 @@ class SweepTable:
         """Whether the cases are all combinations of the values of the keys."""
         return len(self.shape) == len(self.keys) and not self.is_random
 
+    @property
+    def has_curves(self) -> bool:
+        """Whether the measures are those at the peaks of response curves."""
+        return "peak_frequency" in self.measures
+
     def split_lines(self, axis: int) -> np.ndarray:
         """Return the numbers of the cases of a grid as lines along one key.
 

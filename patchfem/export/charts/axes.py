@@ -1,6 +1,7 @@
 """Panels as matplotlib Axes, for pictures and for `plot` in Python, with the traces that a page has."""
 
 import io
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
 from ..answer import Answer
 from ..rows import CHARTS
-from .panel import Panel, use_units
+from .panel import Axis, Panel, find_unit_factor, use_units
 from .panels import make_panels
 from .plotly import ERROR_BAND_OPACITY, Figure, make_traces
 
@@ -42,19 +43,22 @@ MATPLOTLIB_STYLE = {
 }
 # metadata that leave out the date
 METADATA_WITHOUT_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+# Largest ratio of the maxima of response curves that a linear axis shows
+MAX_LINEAR_LEVEL_RATIO = 10.0
 PANEL_SIZE_INCHES = (6.4, 4.2)  # width and height
 
 
 def draw_panel(panel: Panel, axes):
     """Draw the traces of a panel on matplotlib Axes and return them.
 
-    Of a menu the first choice is drawn, and of a film the last frame.
+    Of a menu the first choice is drawn, and of a film the last frame. Curves have other colours than those of the legend.
     """
     if panel.choices:
         return draw_panel(panel.choices[0], axes)
     if axes.has_data():
+        _enlarge_unit(axes, panel)
         panel = use_units(panel, axes.get_xlabel(), axes.get_ylabel())
-    traces = make_traces(panel)
+    traces = make_traces(panel, len(axes.get_legend_handles_labels()[1]))
     for trace in traces[-1:] if panel.style == "film" else traces:
         if "z" in trace:
             _draw_map(trace, axes)
@@ -67,6 +71,35 @@ def draw_panel(panel: Panel, axes):
     if len(axes.get_legend_handles_labels()[1]) > 1 and panel.style != "map":
         axes.legend()
     return axes
+
+
+def _enlarge_unit(axes, panel: Panel) -> None:
+    """Show what matplotlib axes have in the vertical unit of a panel of the same quantity, if that is larger."""
+    label = axes.get_ylabel()
+    factor = find_unit_factor(Axis(label).unit, panel.y.unit)
+    if factor >= 1 or label.partition(" [")[0] != panel.y.label.partition(" [")[0]:
+        return
+    scale = np.array([1.0, factor])
+    for line in _list_curves(axes):
+        line.set_ydata(np.asarray(line.get_ydata()) * factor)
+    for patch in axes.patches:  # bands of errors
+        patch.set_xy(patch.get_xy() * scale)
+    axes.set_ylabel(panel.y.label)
+    axes.relim()
+    axes.autoscale_view()
+
+
+def _list_curves(axes) -> list:
+    """Return the curves of matplotlib axes, without vertical lines."""
+    return [line for line in axes.lines if line.get_transform() == axes.transData]
+
+
+def _show_all_levels(axes) -> None:
+    """Make the vertical axis logarithmic if the largest values of its curves differ by more than a decade."""
+    heights = np.array([np.nanmax(line.get_ydata(), initial=0.0) for line in _list_curves(axes)])
+    heights = heights[heights > 0]
+    if heights.size and heights.max() > MAX_LINEAR_LEVEL_RATIO * heights.min():
+        axes.set_yscale("log")
 
 
 def _draw_curve(trace: Figure, axes) -> None:
@@ -211,7 +244,7 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str, labe
     caller : str
         Function that the message about wrong `axes` names, such as "plot.loop".
     label : str, optional
-        Name of the answer in the legend.
+        Name of the answer in the legend, which has one curve of this name on axes that compare several levels.
 
     Raises
     ------
@@ -219,8 +252,13 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes, caller: str, labe
         If `axes` are not those of matplotlib.
     """
     charts = [chart for chart in CHARTS[answer.kind] if not titles or chart.title in titles]
+    if label:
+        charts = [replace(chart, by="") for chart in charts]
     panels = make_panels({label: answer}, tuple(charts))
-    return draw_panels(panels, axes, caller) if panels else None
+    drawn = draw_panels(panels, axes, caller) if panels else None
+    if label and axes is not None and drawn is not None:
+        _show_all_levels(drawn)
+    return drawn
 
 
 def draw_panels(panels: list[Panel], axes, caller: str):

@@ -138,8 +138,8 @@ def use_units(panel: Panel, x_label: str, y_label: str) -> Panel:
     """
     if panel.style in ("map", "film"):
         return panel
-    x_factor = _find_factor(panel.x.unit, Axis(x_label).unit)
-    y_factor = _find_factor(panel.y.unit, Axis(y_label).unit)
+    x_factor = find_unit_factor(panel.x.unit, Axis(x_label).unit)
+    y_factor = find_unit_factor(panel.y.unit, Axis(y_label).unit)
     curves = []
     for curve in panel.curves:
         ends = {name: getattr(curve, name) for name in ("y", "low", "high")}
@@ -154,7 +154,7 @@ def use_units(panel: Panel, x_label: str, y_label: str) -> Panel:
     )
 
 
-def _find_factor(unit: str, other: str) -> float:
+def find_unit_factor(unit: str, other: str) -> float:
     """Return the number of another display unit in a unit of the same quantity; 1 for another quantity."""
     for ladder in DISPLAY_UNIT_LADDERS.values():
         scales = dict(ladder)

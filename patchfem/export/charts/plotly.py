@@ -89,10 +89,10 @@ def _make_vertical_line(position: float) -> Figure:
     return {"type": "line", "yref": "paper", "line": line} | ends
 
 
-def make_traces(panel: Panel) -> list[Figure]:
+def make_traces(panel: Panel, n_drawn: int = 0) -> list[Figure]:
     """Return the curves or maps of a panel as traces, the data objects of plotly.js, which `axes` draws as well.
 
-    A film has a trace for each frame, all with the same range of colours.
+    A film has a trace for each frame, all with the same range of colours. The first `n_drawn` colours are left out.
     """
     if panel.style in ("map", "film"):
         traces = [_make_map_trace(curve, panel.colour_label) for curve in panel.curves]
@@ -102,7 +102,7 @@ def make_traces(panel: Panel) -> list[Figure]:
         return traces
     groups = []
     for number, curve in enumerate(panel.curves):
-        colour = CURVE_COLOURS[number % len(CURVE_COLOURS)]
+        colour = CURVE_COLOURS[(n_drawn + number) % len(CURVE_COLOURS)]
         if panel.style == "overlay":
             place = number / max(len(panel.curves) - 1, 1)
             mixed = [np.interp(place, (0, 0.5, 1), part) for part in zip(*OVERLAID_CURVE_COLOURS)]

@@ -12,10 +12,12 @@ from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.changes import SweepAnalysis, analyse
 from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
 from ...core import PatchfemError, remove_interface_number
+from ...formatting import format_number
 from ...measures import rows
 from ...runs.batch.case_results import FAILED_OUTCOME
 from ...runs.results.patch_rows import PATCH_TABLE as STATIC
 from ...runs.results.result import describe_measure
+from ...runs.rig.motion_warnings import SAME_FREQUENCY_TOL
 from ...scene.keys.lookup import find_key
 from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks, Variable, Variables
 from ..runs import list_versions
@@ -59,7 +61,10 @@ def make_sweep_answer(
         verdict=verdict,
         quantities=_make_quantities(table, analysis),
         data=_make_data(table, case_folders),
-        remarks=Remarks((*_describe_failures(table), *table.faults), tuple(notes)),
+        remarks=Remarks(
+            (*_describe_failures(table), *table.faults, *_warn_of_ends(sweep_scene, cases, table)),
+            tuple(notes),
+        ),
         details=details,
         origin={
             "patchfem": __version__,
@@ -215,3 +220,28 @@ def _describe_failures(table: SweepTable) -> tuple[str, ...]:
         f"{message} ({count} of {len(table)} cases)"
         for message, count in counts.most_common(MAX_FAILURE_MESSAGES)
     )
+
+
+def _warn_of_ends(sweep_scene: SweepScene, cases: Cases, table: SweepTable) -> list[str]:
+    """Warn of response curves whose largest motion lies at an end of the swept frequencies."""
+    peaks = table.measures.get("peak_frequency")
+    if peaks is None or not np.isfinite(peaks.values).any():
+        return []
+    motions = table.measures[rows.AMPLITUDE]
+    drive = sweep_scene.read_scene(cases.assignments(int(np.isfinite(peaks.values).argmax()))).drive
+    ends = {"drive.from": drive.from_, "drive.to": drive.to}
+    swept = {key.key: key.values for key in table.keys if key.key in ends}
+
+    warnings = []
+    for key, end in (ends | swept).items():
+        is_upper = np.all(end == np.maximum(*(ends | swept).values()))
+        side, move = ("upper", "raise") if is_upper else ("lower", "lower")
+        at_end = np.isclose(peaks.values, end, rtol=SAME_FREQUENCY_TOL, atol=0.0)
+        count = np.count_nonzero(at_end & (motions.values > motions.floors))
+        where = key if key in swept else f"{key} = {format_number(end, 6)} Hz"
+        if count:
+            warnings.append(
+                f"the largest response lies at {where}, the {side} end of the swept frequencies, in {count} of "
+                f"{len(table)} cases, so that it may be no resonance; {move} {key}"
+            )
+    return warnings

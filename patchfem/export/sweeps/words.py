@@ -14,6 +14,7 @@ from ..answer import Quantities, Quantity
 from ..quantities import VALUE_ROUND_OFF, format_quantity, format_value
 
 MIN_NAMED_VARIANCE_FRACTION = 0.01  # fraction of the variance below which a key is not named
+MAX_NAMED_CASES = 3  # largest number of cases that a sentence names
 MAX_NAMED_KEYS = 3  # largest number of keys whose Sobol indices a sentence names
 
 
@@ -23,16 +24,21 @@ def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
     if table.is_random:
         for name, indices in list(analysis.ranking.items())[:1]:
             sentences.append(_describe_ranking(name, indices))
-        for name, (low, _, high) in list(analysis.quantiles.items())[:1]:
-            ends = (_format_measure(name, table.measures[name].unit, end) for end in (low, high))
+        for name, values in list(analysis.quantiles.items())[:1]:
+            unit = table.measures[name].unit
+            low, median, high = (_format_measure(name, unit, value) for value in values)
             sentences.append(
-                f"90 % of the cases have a {_name_in_words(name)} of {' to '.join(ends)}."
+                f"90 % of the cases have a {_name_in_words(name)} of {low} to {high}, with the median {median}."
             )
     elif analysis.peaks:
         sentences.append(_describe_peaks(table, analysis.peaks))
     elif analysis.limits and not analysis.extremes:
         # of a measure with an extreme inside the range of the key, the optimum is what is asked for
-        sentences.append(_describe_limit(analysis.limits))
+        # of response curves, only the height of the peak is asked for
+        limits = [
+            one for one in analysis.limits if not table.has_curves or one.measure == rows.AMPLITUDE
+        ]
+        sentences.append(_describe_limit(limits) if limits else "")
     return (*(sentence for sentence in sentences if sentence), _describe_cases(table, analysis))
 
 
@@ -195,15 +201,19 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
     n_unsettled = cases["count"] - int(table.has_settled.sum()) - sum(counts.values())
     counts[f"unsettled{_describe_unsettled(table, analysis)}"] = n_unsettled
 
-    # Of the measures that miss the tolerance, the one that does so in most cases is named.
+    # Of the measures that miss the tolerance, the one that does so in most cases is named; of curves, the peak amplitude.
     missed = cases["over_tolerance"]
     main = [name for name in MAIN_MEASURES if name in missed] or list(missed)
     if main:
         name = max(main, key=lambda name: missed[name]["count"])
+        words = _name_in_words(name)
+        if table.has_curves and rows.AMPLITUDE in missed:
+            name = rows.AMPLITUDE
+            words = f"peak amplitude{_list_missing_cases(table, name)}"
         others = ""
         if len(missed) > 1:
             others = f" ({len(missed) - 1} other measure{'s' * (len(missed) > 2)} also above it in some cases)"
-        counts[f"over the tolerance in {_name_in_words(name)}{others}"] = missed[name]["count"]
+        counts[f"over the tolerance in {words}{others}"] = missed[name]["count"]
 
     # Settled cases whose main measures have no error
     unknown = np.zeros(len(table), bool)
@@ -222,6 +232,17 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
     if len(table.messages) > cases["failed"]:
         advice = " The column message of sweep.csv says why."
     return f"{len(table)} case{'s' * (len(table) > 1)}: {', '.join(clauses)}.{advice}"
+
+
+def _list_missing_cases(table: SweepTable, name: str) -> str:
+    """Return the values of the only key at which a measure misses its tolerance, such as " at 3 N, 4 N and others"."""
+    varied = [key for key in table.keys if key.count > 1]
+    if len(varied) != 1 or not varied[0].is_number:
+        return ""
+    missing = np.flatnonzero(table.measures[name].misses(table.tolerance))
+    values = varied[0].values[missing[:MAX_NAMED_CASES]]
+    places = ", ".join(format_value(value, varied[0].unit) for value in values)
+    return f" at {places}{' and others' * (missing.size > MAX_NAMED_CASES)}"
 
 
 def _describe_unsettled(table: SweepTable, analysis: SweepAnalysis) -> str:

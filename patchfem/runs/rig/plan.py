@@ -165,6 +165,35 @@ def has_single_mode(rig) -> bool:
     return rig.modes.omega.size == 1 and rig.structure.lists_modes
 
 
+def _find_sticking_force(rig, stiffness: float) -> tuple[float, float | None]:
+    """Return the natural frequency [Hz] of a mode whose interface sticks, and the largest friction force over the drive.
+
+    The force is that of the steady motion without damping, inf at resonance; it is None for a drive of many frequencies.
+
+    Parameters
+    ----------
+    rig : Rig
+        Single mode and its drive.
+    stiffness : float
+        Stiffness of the sticking interface [N/m]; inf if it is rigid, which then carries the drive.
+    """
+    mode = rig.first_mode
+    if np.isinf(stiffness):
+        return inf, 1.0
+    resonance = mode.frequency * np.sqrt(1 + stiffness / mode.stiffness)
+    signal = rig.drive.signal
+    if rig.drive.waveform.is_sine:
+        ends = [1 / signal.period]
+    elif hasattr(signal, "low"):
+        ends = [signal.low, signal.high]
+    else:
+        return resonance, None
+    if min(ends) <= resonance <= max(ends):
+        return resonance, inf
+    part = stiffness / (stiffness + mode.stiffness)
+    return resonance, max(part / abs(1 - (end / resonance) ** 2) for end in ends)
+
+
 def describe_stick(rig, sizes: Values, chain: Chain) -> list[str]:
     """Describe in sentences for a plan whether friction stops a driven block.
 
@@ -182,7 +211,7 @@ def describe_stick(rig, sizes: Values, chain: Chain) -> list[str]:
         the mode allows a stuck block to move.
     """
     ratio = sizes.get("D")
-    if ratio is None or not has_single_mode(rig) or rig.drive.kind == "free":
+    if ratio is None or not has_single_mode(rig) or rig.drive.is_release:
         return []
     stiffness = rig.first_mode.stiffness
     limit = MIN_HOLDING_LINK_STIFFNESS_RATIO * stiffness
@@ -195,6 +224,16 @@ def describe_stick(rig, sizes: Values, chain: Chain) -> list[str]:
             f"({link}) is {chain[link]:.4g} N/m and the stiffness of the mode is {stiffness:.4g} N/m"
         ]
     if ratio >= 1:
+        # An elastic interface carries more than the drive near the resonance of the sticking block.
+        compliance = sum(1 / link for name, link in links.items() if name not in ("mode", "bonded"))
+        hertz, force_ratio = _find_sticking_force(rig, 1 / compliance if compliance else inf)
+        if force_ratio is None:
+            return []
+        if force_ratio > ratio:
+            return [
+                f"D = {ratio:.3g} >= 1, but the interface is elastic, so that the block may slip near {hertz:.4g} Hz, "
+                "its natural frequency while it sticks"
+            ]
         return [f"D = {ratio:.3g} >= 1: friction should hold the block, so that it sticks"]
 
     # The kinetic friction limit acts while the block slides.

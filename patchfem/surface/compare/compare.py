@@ -261,8 +261,8 @@ def _measure(
     tracks = ()
     if code.startswith("worn"):
         # The area of a single track is that of the common part.
-        whole = loss[:3] if len(spans) == 1 else None
-        tracks = tuple(measure_track(depths, span, whole) for span in spans)
+        common_loss = loss[:3] if len(spans) == 1 else None
+        tracks = tuple(measure_track(depths, span, common_loss) for span in spans)
     if tracks and not _is_clear_track(tracks[0], depths, is_placed=is_placed):
         is_beyond_drift = is_placed and area > HALF_WIDTH_95 * error
         unworn_code = "no_wear" if is_placed else "elsewhere"

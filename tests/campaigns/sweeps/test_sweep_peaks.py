@@ -2,11 +2,34 @@
 
 import numpy as np
 import pytest
+from command_line import run_successfully
 from sweep_tables import make_table
 
+from patchfem.campaigns.sweeps.changes import analyse
 from patchfem.campaigns.sweeps.peaks import find_peaks, locate_peak
+from patchfem.export.sweeps.words import make_verdict
 
 NATURAL = 143.0  # [Hz]
+BLOCK = """
+[structure]
+moving_mass = "0.3 kg"
+mode = [{name = "block", frequency = "200 Hz", damping = 0.001, slide = 1.0}]
+[friction]
+law = "coulomb"
+static = 0.35
+[normal]
+load = "1 N"
+[drive]
+kind = "force"
+waveform = "sweep"
+from = "195 Hz"
+to = "205 Hz"
+rate = "1 Hz/s"
+force = "2 N"
+[accuracy]
+method = "harmonic"
+tolerance = 1e-2
+"""
 
 
 def respond(frequency, damping):
@@ -72,3 +95,31 @@ def test_exact_peaks_of_two_loads_and_missing_peaks():
     )
     assert find_peaks(falling) == []
     assert locate_peak(frequency[:4], values[0][:4], np.zeros(4)) is None
+
+
+def test_always_verdict_on_curves_names_the_peak_amplitude():
+    """Curves that miss the tolerance are named with their peak amplitude; a limit of the friction force is no answer."""
+    peaks = np.array([2e-3, 2.1e-3, 2.05e-3, 1.98e-3])
+    columns = {"relative_displacement_amplitude": peaks, "peak_frequency": np.full(4, 200.0)}
+    columns["friction_force_peak"] = np.arange(1.0, 5.0)
+    table = make_table({"normal.load": np.arange(1.0, 5.0)}, columns, errors=1e-7)
+    for name in columns:
+        table.measures[name].errors[1] = 0.1 * abs(columns[name][1])
+    verdict = " ".join(make_verdict(table, analyse(table)))
+    assert "1 over the tolerance in peak amplitude at 2 (2 other measures" in verdict
+    assert "before friction force" not in verdict
+
+
+def test_sweep_of_curves_shows_peaks_and_warns_at_ends(tmp_path):
+    """The screen shows amplitude and frequency of each peak, and warns of those at an end of the range."""
+    scene = tmp_path / "block.toml"
+    scene.write_text(BLOCK)
+    answer = run_successfully(
+        "sweep", str(scene), "--over", "normal.load=1 N,5 N", "-o", tmp_path / "out"
+    )
+    rows = [line.split() for line in answer.out.splitlines() if line.startswith("  ")]
+    assert rows[0] == "normal.load peak amplitude peak frequency".split()
+    assert (rows[1][0], rows[2][-2:]) == ("1", ["195", "Hz"])
+    assert (
+        "drive.from = 195 Hz, the lower end of the swept frequencies, in 1 of 2 cases" in answer.err
+    )
