@@ -17,8 +17,6 @@ from .cases import Cases
 
 # Largest error, relative to the value, of a value that counts for statements.
 MAX_TRUSTED_RELATIVE_ERROR = 0.5
-# Largest relative error of the steady estimate of a case that did not settle; that near an onset of slip has a few percent.
-MAX_STEADY_ERROR = 0.05
 # Outcomes of cases whose motion no longer changes.
 FINAL_OUTCOMES = (Outcome.STEADY, Outcome.STUCK, Outcome.DONE, Outcome.NO_CONTACT)
 
@@ -194,14 +192,16 @@ class SweepTable:
         """Return the column of the measure `name` with only the values that count for statements on it, NaN for others.
 
         A value counts if its case has settled, and if its error is at most half of it or meets the tolerance. Instead of
-        the value of another case, its steady estimate counts with its error, if it is exact enough. All cases count if
-        none of them has a settled value or such an estimate, or if the measure is a steady estimate itself.
+        the value of another case, its steady estimate counts with its error, if that is at most half of it. All cases
+        count if none of them has a settled value or such an estimate, or if the measure is a steady estimate itself.
         """
         column = self.measures[name]
         counts = self.has_settled
         steady = self.measures.get(f"{name}_steady")
         if steady is not None:
-            is_used = ~counts & (steady.errors <= MAX_STEADY_ERROR * np.abs(steady.values))
+            is_used = ~counts & (
+                steady.errors <= MAX_TRUSTED_RELATIVE_ERROR * np.abs(steady.values)
+            )
             column = MeasureColumn(
                 column.unit,
                 np.where(is_used, steady.values, column.values),

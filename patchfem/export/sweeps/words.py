@@ -246,23 +246,33 @@ def _list_missing_cases(table: SweepTable, name: str) -> str:
 
 
 def _describe_unsettled(table: SweepTable, analysis: SweepAnalysis) -> str:
-    """Return for how many unsettled cases steady estimates count.
+    """Return in brackets for how many unsettled cases steady estimates count, and how large the others become.
 
-    Without one, return their largest amplitude in brackets if it is above that of all others.
+    The largest amplitude of the others is named if it is above that of all cases that count.
     """
     n_steady = 0
     for name in (entry.measure for entry in analysis.ranges):
         if f"{name}_steady" in table.measures:
             is_known = np.isfinite(table.select_trusted(name).values) & ~table.has_settled
             n_steady = max(n_steady, int(np.count_nonzero(is_known)))
-    if n_steady:
-        return f" (of which {n_steady} with a steady estimate that counts)"
+    clauses = [f"of which {n_steady} with a steady estimate that counts"] * bool(n_steady)
+
     name = MAIN_MEASURES[0]
-    if name not in table.measures:
-        return ""
-    values = table.measures[name].values
-    unsettled = values[~table.has_settled & np.isfinite(values)]
-    if not unsettled.size or unsettled.max() <= np.nanmax(values[table.has_settled], initial=0.0):
-        return ""
-    text = format_value(unsettled.max(), table.measures[name].unit)
-    return f" (their {_name_in_words(name)} is up to {text} at the end)"
+    if name in table.measures:
+        values = table.measures[name].values
+        counted = table.select_trusted(name).values
+        is_left_out = ~table.has_settled & np.isfinite(values)
+        if n_steady:
+            is_left_out &= np.isnan(counted)
+        else:
+            counted = np.where(table.has_settled, values, np.nan)
+        largest = values[is_left_out].max(initial=0.0)
+        if largest > np.nanmax(counted, initial=0.0):
+            text = format_value(largest, table.measures[name].unit)
+            whose = (
+                f"the {_name_in_words(name)} of the others"
+                if n_steady
+                else f"their {_name_in_words(name)}"
+            )
+            clauses.append(f"{whose} is up to {text} at the end")
+    return f" ({'; '.join(clauses)})" if clauses else ""

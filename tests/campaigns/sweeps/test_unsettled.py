@@ -80,16 +80,24 @@ def test_exact_single_settled_case_has_no_range():
 
 
 def test_exact_steady_estimate_of_an_unsettled_case_counts():
-    """An unsettled case counts with its steady estimate and error, unless the error is above 5 %."""
+    """An unsettled case counts with its steady estimate and error, unless the error is above half of it."""
     outcome = np.array(["steady", "transient", "transient", "transient"], object)
     steady = np.array([np.nan, 4.0, 2.0, 99.0])
     columns = {"slip_amplitude": np.arange(1.0, 5.0), "slip_amplitude_steady": steady}
     table = make_table({"normal.load": np.arange(1.0, 5.0)}, columns, outcome=outcome, errors=0.01)
-    table.measures["slip_amplitude_steady"].errors[3] = 6.0
+    table.measures["slip_amplitude_steady"].errors[3] = 60.0
     assert np.array_equal(table.select_trusted("slip_amplitude").values, [1, 4, 2, np.nan], True)
     verdict = make_verdict(table, analyse(table))
     assert "slip amplitude changes most: from 1 at 1 to 4 at 2" in verdict[0]
     assert "3 unsettled (of which 2 with a steady estimate that counts)" in verdict[-1]
+
+    # the largest amplitude of a case that does not count is not left unsaid
+    columns = {f"relative_displacement_{name[5:]}": one for name, one in columns.items()}
+    columns["relative_displacement_amplitude"][3] = 7.0
+    table = make_table({"normal.load": np.arange(1.0, 5.0)}, columns, outcome=outcome, errors=0.01)
+    table.measures["relative_displacement_amplitude_steady"].errors[3] = 60.0
+    words = "; the relative displacement amplitude of the others is up to 7 at the end)"
+    assert words in make_verdict(table, analyse(table))[-1]
 
 
 # ---- extremes inside the range of a key
