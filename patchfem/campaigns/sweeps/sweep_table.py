@@ -15,10 +15,6 @@ from ...core import Outcome, compute_allowed_error
 from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
 from .cases import Cases
 
-# Largest error, relative to the value, of a value that counts for statements.
-MAX_TRUSTED_RELATIVE_ERROR = 0.5
-# Largest relative error of the steady estimate of a case that did not settle; that near an onset of slip has a few percent.
-MAX_STEADY_ERROR = 0.05
 # Outcomes of cases whose motion no longer changes.
 FINAL_OUTCOMES = (Outcome.STEADY, Outcome.STUCK, Outcome.DONE, Outcome.NO_CONTACT)
 
@@ -196,7 +192,9 @@ class SweepTable:
         counts = self.has_settled
         steady = self.measures.get(f"{name}_steady")
         if steady is not None:
-            is_used = ~counts & (steady.errors <= MAX_STEADY_ERROR * np.abs(steady.values))
+            # Largest relative error of the steady estimate of a case that did not settle; that near
+            # an onset of slip has a few percent.
+            is_used = ~counts & (steady.errors <= 0.05 * np.abs(steady.values))
             column = MeasureColumn(
                 column.unit,
                 np.where(is_used, steady.values, column.values),
@@ -206,7 +204,8 @@ class SweepTable:
             counts = counts | is_used
         if name.endswith("_steady") or not counts.any():
             counts = np.ones(len(self), bool)
-        is_vague = column.misses(MAX_TRUSTED_RELATIVE_ERROR) & column.misses(self.tolerance)
+        # Largest error, relative to the value, of a value that counts for statements.
+        is_vague = column.misses(0.5) & column.misses(self.tolerance)
         return replace(column, values=np.where(counts & ~is_vague, column.values, np.nan))
 
     def count_cases(self) -> dict[str, int | dict]:
