@@ -32,14 +32,6 @@ RESIDUAL_REMEDY = "; make the rough layer softer (raise the decay length or the 
 MAX_UNTOUCHED_LOG_PRESSURE = -300.0
 # Largest logarithm of a force [N] for which products with the exponential function do not overflow
 MAX_LOG_FORCE = 600.0
-# Smallest slope, relative to the largest slope, for which a Newton step changes the force
-MIN_RELATIVE_SLOPE = 1e-18
-# Relative imbalance and relative change of pressure at which Newton's method has converged
-LAYER_NEWTON_TOL = 1e-12
-# Largest pressure that an unloaded node may reach in one step, relative to the mean pressure
-MAX_PRESSURE_RISE_PER_STEP = 0.01
-# Smallest depth [m] in a divisor; it keeps the residual of a flat gap finite
-MIN_GAP_DEPTH = 1e-150
 
 
 class AsperityProblem(NamedTuple):
@@ -112,7 +104,8 @@ def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> _Newto
 
     # Forces D^1/2 (I + D^1/2 C D^1/2)^-1 D^1/2 of the nodes that the layer loads, for each column; this matrix is well
     # conditioned at every slope D
-    nodes = np.flatnonzero(slope > MIN_RELATIVE_SLOPE * slope.max())
+    # Smallest slope, relative to the largest slope, for which a Newton step changes the force
+    nodes = np.flatnonzero(slope > 1e-18 * slope.max())
     if nodes.size:
         root = np.sqrt(slope[nodes])[:, None]
         matrix = root * problem.compliance[nodes[:, None], nodes] * root.T
@@ -170,7 +163,8 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         depth = np.ptp(contact.gap) + np.abs(problem.compliance @ force).max()
         depth += 2 * np.abs(motion[1:]).sum()
         # Round-off of a separation changes the pressure of the loaded nodes by this fraction.
-        noise = LAYER_NEWTON_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
+        # Relative imbalance and relative change of pressure at which Newton's method has converged
+        noise = 1e-12 + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
         relative_imbalance = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
         if max(relative_imbalance, np.max(fraction * np.abs(log_change))) <= noise:
             # The force of a nearly unloaded node is computed from the pressure law of the asperity
@@ -186,9 +180,9 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         along_log = -np.log1p(np.maximum(log_change, 0.0)) / decay
         limited_change = np.where(log_change > 0, along_log, change)
         load = contact.target[0] if imbalance.size else force.sum()
-        risen = asperities.separation(
-            np.array(MAX_PRESSURE_RISE_PER_STEP * load / problem.area.sum())
-        )
+        # Largest pressure that an unloaded node may reach in one step, relative to the mean
+        # pressure
+        risen = asperities.separation(np.array(0.01 * load / problem.area.sum()))
         separation = separation + np.maximum(change, np.minimum(limited_change, risen - separation))
     raise NotConverged(LAYER_DIVERGED_MESSAGE)
 
@@ -269,7 +263,8 @@ def compute_law_residuals(layer: AsperityProblem, solution: AsperitySolution) ->
     asperities, _, area, problem = layer
     force = solution.force
     opening = layer.separation(force, solution.motion)
-    depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + MIN_GAP_DEPTH
+    # Smallest depth [m] in a divisor; it keeps the residual of a flat gap finite
+    depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + 1e-150
     largest = max(force.max(), np.exp(MAX_UNTOUCHED_LOG_PRESSURE))
     mismatch = np.abs(force - area * asperities.pressure(opening))
     mismatch -= area * np.exp(MAX_UNTOUCHED_LOG_PRESSURE)

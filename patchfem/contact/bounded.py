@@ -16,21 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Number of steps without a lower energy after which a projected gradient step follows. A changed set of cells takes two or
-# three steps to lower the energy.
-MAX_STEPS_WITHOUT_GAIN = 8
-# Largest scalar product of two successive slopes, relative to the square of the last one, at which the directions are
-# conjugate; beyond it the last direction is forgotten (Powell, Math. Program. 12, 1977, 241)
-MAX_SLOPE_OVERLAP = 0.2
-# Rounding error of a slope, relative to the largest gap of the cells between the bounds
-GAP_ROUND_OFF = 1e-15
-# Largest error of a resultant, relative to the largest prescribed one, at which the tractions are not restored again
-RESULTANT_TOL = 1e-12
 MAX_RESTORATIONS = 40  # Largest number of Newton steps that restore the resultants
 # Rounding errors of the resultants, in units of the last digit of the tractions that the shift adds
 RESULTANT_ROUND_OFF = 16 * np.finfo(float).eps
-# Share of the response of all cells in Newton's response; fewer cells between the bounds than motions have none of their own
-UNLOADED_CELL_SHARE = 1e-9
 
 
 class BoundedProblem(NamedTuple):
@@ -116,7 +104,8 @@ def solve_bounded(
         moving_slope = np.where(is_moving, slope, 0.0)
 
         # Optimality: the slope vanishes between the bounds and has the right sign at them
-        noise = GAP_ROUND_OFF * np.abs(problem.gap[is_free]).max(initial=0.0)
+        # Rounding error of a slope, relative to the largest gap of the cells between the bounds
+        noise = 1e-15 * np.abs(problem.gap[is_free]).max(initial=0.0)
         scale = max(np.abs(state.displacement).max(), np.finfo(float).tiny)
         residual = max(np.abs(moving_slope).max() - noise, 0.0) / scale
         if residual <= tolerance:
@@ -128,7 +117,9 @@ def solve_bounded(
         if state.energy < best.energy:
             best = state
             n_without_gain = 0
-        if n_without_gain > MAX_STEPS_WITHOUT_GAIN:
+        # Number of steps without a lower energy after which a projected gradient step follows. A
+        # changed set of cells takes two or three steps to lower the energy.
+        if n_without_gain > 8:
             largest_eigenvalue = compliance.product(np.ones(traction.shape)).max()
             gradient = best.displacement + problem.gap - holder.move(best.motion)
             moved = best.traction - gradient / largest_eigenvalue
@@ -187,7 +178,10 @@ class _Directions:
         square = float(np.vdot(slope, steepest.traction))
         if self.last_square > 0:
             overlap = float(np.vdot(self.last_slope, steepest.traction))
-            if abs(overlap) <= MAX_SLOPE_OVERLAP * square:
+            # Largest scalar product of two successive slopes, relative to the square of the last
+            # one, at which the directions are conjugate; beyond it the last direction is forgotten
+            # (Powell, Math. Program. 12, 1977, 241)
+            if abs(overlap) <= 0.2 * square:
                 factor = (square - overlap) / self.last_square
                 direction = _Direction(
                     steepest.traction + factor * np.where(is_moving, self.last.traction, 0.0),
@@ -354,7 +348,9 @@ class _Holder:
         start = traction.flat[movable]
         fixed = np.where(is_movable, 0.0, np.clip(traction, self.lower, self.upper))
         target = self.target - self.rigid @ fixed.ravel()
-        tolerance = RESULTANT_TOL * np.abs(self.target).max()
+        # Largest error of a resultant, relative to the largest prescribed one, at which the
+        # tractions are not restored again
+        tolerance = 1e-12 * np.abs(self.target).max()
 
         def find_error(shift):
             """Return the missing resultants (r,) after a shift (r,) by motions of the holder."""
@@ -376,7 +372,9 @@ class _Holder:
                 return _State(out, motion + shift)
             inside = rigid[:, is_inside]
             response = inside @ inside.T / self.self_compliance + np.diag(self.springs)
-            response += UNLOADED_CELL_SHARE * all_response
+            # Share of the response of all cells in Newton's response; fewer cells between the
+            # bounds than motions have none of their own
+            response += 1e-9 * all_response
             direction = np.linalg.lstsq(response, error, rcond=1e-13)[0]
 
             # The derivative of the concave dual function along the direction falls from a positive value through 0; the

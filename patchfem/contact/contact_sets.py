@@ -17,7 +17,6 @@ from .set_arrays import SetArrays, make_set_arrays
 
 # Largest memory [bytes] of the stored contact sets; when it is full, the oldest set is replaced
 MAX_STORED_SETS_BYTES = 64e6
-MAX_STORED_SETS = 100_000  # largest number of stored contact sets; no problem needs more
 
 
 class ContactSets:
@@ -72,7 +71,8 @@ class ContactSets:
         `max_bytes` is the largest memory for the stored contact sets [bytes].
         """
         # One set takes 25 m + 80 bytes: unknowns, nodes, energy and names.
-        n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 80), MAX_STORED_SETS)))
+        # Largest number of stored contact sets; no problem needs more
+        n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 80), 100_000)))
         return make_set_arrays(
             self.c,
             self.x,

@@ -15,10 +15,6 @@ from .set_table import find_set_ends
 # Smallest pressure, relative to the largest, at which a node with a smooth asperity law counts as
 # in contact
 MIN_CONTACT_PRESSURE_RATIO = 1e-13
-# Fraction of the pressure at an edge as which a smaller pressure counts, so that its logarithm is finite
-MIN_EDGE_PRESSURE_RATIO = 1e-287
-# Largest ratio of first-row height to cell length for which `compute_edge_offset` was measured
-MAX_CELL_ASPECT = 4.0
 # Offset of an edge in cells of second order, in cell lengths: that of Hertz contact on structured and gmsh meshes of
 # triangles and quadrilaterals with aspects 0.3 to 2.4, within 0.03
 QUADRATIC_EDGE_OFFSET_FRACTION = 0.345
@@ -50,7 +46,8 @@ def compute_edge_offset(
     cell = (1 - fraction) * inner + fraction * outer
     if offset is not None:
         return offset * cell
-    aspect = np.minimum(1.0 if row_height is None else row_height / cell, MAX_CELL_ASPECT)
+    # Largest ratio of first-row height to cell length for which `compute_edge_offset` was measured
+    aspect = np.minimum(1.0 if row_height is None else row_height / cell, 4.0)
     return (0.3048 - 0.0818 * aspect**2 / (1 + 0.585 * aspect)) * cell
 
 
@@ -190,9 +187,9 @@ def find_pressure_edges(x, pressure, threshold) -> ContactEdges:
     node, side = find_set_ends(pressure > threshold)
     rows = np.arange(len(node))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        height = np.log(np.maximum(pressure, MIN_EDGE_PRESSURE_RATIO * threshold)) - np.log(
-            threshold
-        )
+        # Fraction of the pressure at an edge as which a smaller pressure counts, so that its
+        # logarithm is finite
+        height = np.log(np.maximum(pressure, 1e-287 * threshold)) - np.log(threshold)
         fraction = height[rows, node] / (height[rows, node] - height[rows, node + side])
     fraction = np.where(side != 0, fraction, 0.5)
     position = x[node] + fraction * (x[node + side] - x[node])

@@ -9,8 +9,6 @@ from .bounded import BoundedProblem, solve_bounded
 from .cells import CellCompliance
 
 MAX_ITERATIONS = 4000  # Largest number of steps; a hard case takes about 200
-# Largest residual of the equations of a contact set; it enters a stiffness squared, and edges of the set linearly
-SET_RESIDUAL_TOL = 1e-9
 
 
 class FaceLoading(NamedTuple):
@@ -157,4 +155,6 @@ def solve_on_set(
     motion = np.broadcast_to(motion, active.shape)
     bound = np.where(active, np.inf, 0.0)
     problem = BoundedProblem(-motion, -bound, bound)
-    return solve_bounded(compliance, problem, tolerance=SET_RESIDUAL_TOL).traction
+    # Largest residual of the equations of a contact set; it enters a stiffness squared, and edges
+    # of the set linearly
+    return solve_bounded(compliance, problem, tolerance=1e-9).traction

@@ -31,9 +31,6 @@ INDEFINITE_COMPLIANCE_MESSAGE = (
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
     "cells of contact.mesh"
 )
-MAX_TABLES = 4  # number of tables on which a contact problem is solved, of which the last two start from the gradients
-# Smallest total force [N] in a divisor; it keeps residuals of open pieces finite
-MIN_TOTAL_FORCE = 1e-200
 
 
 class ContactSolution(NamedTuple):
@@ -203,7 +200,9 @@ def solve(compliance: np.ndarray, problem) -> ContactSolution:
     # A gap that is measured from the motion found loses no digits; where the sets cycle, the gradients show the set
     near = ContactSolution(np.zeros(problem.gap.size), np.zeros(springs.size))
     residuals = {}
-    for attempt in range(MAX_TABLES):
+    # Number of tables on which a contact problem is solved, of which the last two start from the
+    # gradients
+    for attempt in range(4):
         solution = solve_on_table(compliance, problem, near)
         if solution is not None:
             residuals = compute_residuals(compliance, problem, solution)
@@ -244,7 +243,8 @@ def compute_residuals(
     scale = np.abs(problem.gap) + np.abs(solution.motion) @ np.abs(problem.motions)
     scale += np.abs(compliance) @ np.abs(force)
     relative_opening = opening / np.where(scale > 0, scale, 1.0)
-    load = max(force.sum(), MIN_TOTAL_FORCE)
+    # Smallest total force [N] in a divisor; it keeps residuals of open pieces finite
+    load = max(force.sum(), 1e-200)
     residuals = {
         "penetration": max(0.0, -relative_opening.min()),
         "tension": max(0.0, -force.min()) / load,

@@ -17,10 +17,6 @@ import numpy as np
 
 from ..elasticity.sides import LayerStack
 
-# Largest product of wave number and thickness for which a wave reaches the other side of a layer; its relative amplitude
-# exp(-40) there is below round-off
-MAX_WAVE_DEPTH = 40.0
-
 
 class WaveCompliance(NamedTuple):
     """Displacement of the face per traction [m/Pa] at wave numbers of any shape.
@@ -105,7 +101,9 @@ def _add_layer(kd, moduli: tuple[float, float], plane, across) -> _ScaledComplia
         Compliance of the base times wave number [1/Pa].
     """
     # Waves that decay downwards, at the face and at the foot; a wave that decays upwards starts at the foot
-    depth = np.minimum(kd, MAX_WAVE_DEPTH)
+    # Largest product of wave number and thickness for which a wave reaches the other side of a
+    # layer; its relative amplitude exp(-40) there is below round-off
+    depth = np.minimum(kd, 40.0)
     none = np.zeros(kd.size)
     down_u, down_t = _evaluate_waves(none, moduli, 1.0)
     foot_u, foot_t = _evaluate_waves(depth, moduli, 1.0)

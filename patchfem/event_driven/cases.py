@@ -32,10 +32,8 @@ MIN_STEPS = 12  # steps per shortest period of drive and load, so that no short 
 MIN_SCALE = 1e-3  # smallest magnitudes of a motion relative to those expected
 REVERSALS = 512  # nested reversals that a law remembers, as in `points.laws`
 MAX_STEPS = 3e6  # steps of a run; with the comparison run they take up to 50 CPU seconds
-MAX_CYCLE_STEPS = 100  # further steps per cycle that a run may take
 DEFAULT_RTOL = 1e-7  # tolerance of a step
 EXACT_RTOL = 1e-12  # the same for accuracy.method = "exact"
-MIN_COMPUTED = 3  # cycles at the end of which each is computed
 N_STATE_ROWS = 30  # rows of `State.rows`
 
 
@@ -285,7 +283,8 @@ def make_schedule(cycles: float, period: float, window: int) -> tuple[np.ndarray
     number = np.arange(count)
     # Whole cycles are counted from the end of the run, so that the first one may be a part.
     ends = period * (cycles - (count - 1 - number))
-    windows = np.where(number >= count - MIN_COMPUTED, -2.0, -1.0)
+    # Cycles at the end of which each is computed
+    windows = np.where(number >= count - 3, -2.0, -1.0)
     windows[max(0, count - window) :] = 0.0
     return ends, windows
 
@@ -353,7 +352,8 @@ def make_rig_case(
     signal = make_signal(drive)
     interfaces = list_interfaces(rig, joints)
 
-    max_steps = MAX_STEPS + MAX_CYCLE_STEPS * schedule.cycles
+    # Further steps per cycle that a run may take
+    max_steps = MAX_STEPS + 100 * schedule.cycles
     options = Options(drive.moving, schedule.travel, rtol, max_steps, n_steps)
     arrays = make_rig(
         modes, signal, interfaces, find_sizes(modes, signal, drive, rig.start), options

@@ -16,15 +16,10 @@ from .records import Face, LawNumbers, Memory, Setting, State
 
 N_NODES = 48  # nodes of Gauss's rule over a branch of a loop, which is exact while no element slips
 N_AMPLITUDES = 200  # amplitudes of the table of a law, evenly in the logarithm
-MIN_AMPLITUDE_RATIO = 1e-2  # smallest amplitude of this table, relative to the stretch before slip
-N_SUBSTITUTIONS = 60  # substitutions of the stiffness, each by half of its change
 # Height of the first-harmonic balance from which on a frequency is examined, relative to the highest steady motion. For the
 # damper of the template, whose second mode answers to the third harmonic, the balance exceeds the motion by up to 150 %
 # and falls short of it by 20 %.
 MIN_HEIGHT_RATIO = 0.7
-# Stretch of the element that stands for rigid friction, relative to the slide without friction
-RIGID_STRETCH_RATIO = 1e-2
-SUBSTITUTION_TOL = 1e-3  # relative change of all stiffnesses at which the substitutions end
 
 
 class BalancedMotions(NamedTuple):
@@ -96,14 +91,16 @@ def balance_first_harmonic(
 
     # U = (I + G K)^-1 d with the receptance G of the interfaces and the slides d without friction
     stiffness = np.tile([law.stiffness + 0j for law in laws], (len(omega), 1))
-    for _ in range(N_SUBSTITUTIONS):
+    # Substitutions of the stiffness, each by half of its change
+    for _ in range(60):
         matrix = np.eye(n_laws) + at_interfaces[:, :, :n_laws] * stiffness[:, None]
         slides = np.linalg.solve(matrix, at_interfaces[:, :, n_laws:])[:, :, 0]
         change = -stiffness
         for i, table in enumerate(tables):
             change[:, i] += table.find_stiffness(np.abs(slides[:, i]))
         stiffness += 0.5 * change
-        if np.abs(change).max() <= SUBSTITUTION_TOL * np.abs(stiffness).max():
+        # Relative change of all stiffnesses at which the substitutions end
+        if np.abs(change).max() <= 1e-3 * np.abs(stiffness).max():
             break
     loads = np.column_stack([-stiffness * slides, np.ones(len(omega))])
     return BalancedMotions(omega, (receptance @ loads[:, :, None])[:, :, 0], slides)
@@ -113,7 +110,8 @@ def _soften(law: LawNumbers, load: Load, largest: float) -> LawNumbers:
     """Return an element in place of rigid friction under a load, which sticks below a part of the largest slide [m]."""
     if law.law == "masing":
         return law
-    length = RIGID_STRETCH_RATIO * largest
+    # Stretch of the element that stands for rigid friction, relative to the slide without friction
+    length = 1e-2 * largest
     return masing.from_elements([law.numbers[1] * load.mean / length], [length])
 
 
@@ -143,7 +141,8 @@ def _tabulate_stiffness(law: LawNumbers, largest: float) -> _StiffnessTable:
     """
     numbers = np.array(law.numbers)
     last = max(2 * largest, 10 * law.length)
-    amplitudes = np.geomspace(MIN_AMPLITUDE_RATIO * law.length, last, N_AMPLITUDES)
+    # Smallest amplitude of this table, relative to the stretch before slip
+    amplitudes = np.geomspace(1e-2 * law.length, last, N_AMPLITUDES)
     nodes, weights = np.polynomial.legendre.leggauss(N_NODES)
     angle = (nodes + 1) * np.pi / 2
     way = amplitudes[:, None] * np.sin(angle / 2) ** 2

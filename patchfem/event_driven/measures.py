@@ -25,8 +25,6 @@ from .records import (
     Window,
 )
 
-# Imbalance that counts as round-off, relative to the energy of the smallest speed
-MIN_ENERGY = 1e-6
 # Measures of every interface; those of further ones carry its number. Other measures are those of the first one alone.
 INTERFACE_MEASURES = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")
 
@@ -130,5 +128,6 @@ def _compute_work(case: Case, state: State) -> dict[str, float]:
         # A bench starts without a stretch.
         return values | {"energy_stored": work - loss}
     n = case.rig.modes.shape[1]
-    round_off = MIN_ENERGY * settings[Setting.MASS] * case.rig.scales[n] ** 2
+    # Imbalance that counts as round-off, relative to the energy of the smallest speed
+    round_off = 1e-6 * settings[Setting.MASS] * case.rig.scales[n] ** 2
     return values | {"energy_balance": energy_balance(compute_energies(case, state), round_off)}

@@ -33,13 +33,8 @@ from .runs import run_case
 
 MAX_STEPS = 6e6  # steps of the engine over all periods of a curve, which take about a minute
 N_FIRST = 2  # periods in which the laws take the memory of the loop of a motion from another map
-MIN_ARC_STEP = 1e-7  # smallest step of the arc length
 MAX_CORRECTION = 0.5  # longest Newton step, as arc length
 MIN_STEP_COSINE = 0.7  # smallest cosine between a step and the tangent; a larger angle is a jump
-MIN_TANGENT_COSINE = 0.1  # smallest cosine between two tangents in the cubic through a fold
-# Distance from an earlier step, relative to its length, at which a curve has closed
-SAME_CURVE_TOL = 0.05
-RANK_TOL = 1e-12  # singular values of a singular matrix are below it, relative to the largest
 
 
 class PathSettings(NamedTuple):
@@ -301,7 +296,8 @@ class MotionCurve(ExtendedShooting):
         place = int(np.searchsorted(known.columns, self.extra[0]))
         matrix[place] = self.make_normal(direction, unit)[known.columns] * known.scale
         right_side = np.eye(known.columns.size)[place]
-        scaled = np.linalg.lstsq(matrix, right_side, rcond=RANK_TOL)[0]
+        # Singular values of a singular matrix are below it, relative to the largest
+        scaled = np.linalg.lstsq(matrix, right_side, rcond=1e-12)[0]
         tangent = np.zeros(self.aimed.size)
         tangent[known.columns] = known.scale * scaled
         return tangent / np.linalg.norm(tangent[: self.n] / self.size / unit)
@@ -424,7 +420,8 @@ class MotionCurve(ExtendedShooting):
                 taken = self._find_point(guess, point, direction, unit)
                 if taken is None or not _is_along(point, taken[0], direction, unit):
                     step /= 2
-                    if step < MIN_ARC_STEP:
+                    # Smallest step of the arc length
+                    if step < 1e-7:
                         ended = "step"
                         break
                     continue
@@ -519,7 +516,8 @@ def _is_on_curve(point: PathPoint, points: list[PathPoint], direction, unit) -> 
     to_point = point.w / unit - starts
     along = np.sum(to_point * steps, axis=1) / lengths
     across = np.linalg.norm(to_point - (along / lengths)[:, None] * steps, axis=1)
-    is_between = (along >= 0) & (along <= lengths) & (across < SAME_CURVE_TOL * lengths)
+    # Distance from an earlier step, relative to its length, at which a curve has closed
+    is_between = (along >= 0) & (along <= lengths) & (across < 0.05 * lengths)
     is_parallel = steps @ direction > MIN_STEP_COSINE * lengths
     return bool((is_between & is_parallel).any())
 
@@ -546,7 +544,8 @@ def _find_folds(
     slopes = np.array([tangents[0][-1], tangents[1][-1]])
     if slopes[0] * slopes[1] >= 0:
         return []
-    slopes[1] /= max(float(tangents[0] @ tangents[1]), MIN_TANGENT_COSINE)
+    # Smallest cosine between two tangents in the cubic through a fold
+    slopes[1] /= max(float(tangents[0] @ tangents[1]), 0.1)
     slopes *= unit[-1]
     parameters = np.array([point.w[-1] for point in points])
     curve = CubicHermiteSpline([0.0, length], parameters, slopes)

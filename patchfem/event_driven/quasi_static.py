@@ -21,12 +21,6 @@ from .drives import make_tones
 from .laws import masing
 from .periodic import find_periodic_motion
 
-LOOP_RTOL = 1e-11  # tolerance of a step of a loop without a closed form
-TEST_RATE_RATIO = 2.0  # ratio of two drive frequencies at which the loops of a law are compared
-LOOP_TOL = 1e-6  # relative change of a loop that is due to its steps
-# Change of the slides, relative to those of the stuck mode, at which their search ends
-SLIDE_ROOT_TOL = 1e-13
-SLIDE_TOL = 1e-9  # relative error of the slides of an equilibrium
 SPEED_MESSAGE = "a friction force that depends on the sliding speed has no static loop"
 
 
@@ -72,7 +66,8 @@ def find_loop(
     # The periodic motion of a bench, whose slide is prescribed
     alone = [interface._replace(slide=np.ones(1))]
     signal = make_tones([(u, omega, 0.0)], 2 * np.pi / omega)
-    rig = make_rig(None, signal, alone, (u, u * omega), Options(rtol=rtol or LOOP_RTOL))
+    # Tolerance of a step of a loop without a closed form
+    rig = make_rig(None, signal, alone, (u, u * omega), Options(rtol=rtol or 1e-11))
     case = Case(rig, make_start(rig, alone), np.zeros(1), np.zeros(1), np.zeros(0), 1)
     values = find_periodic_motion(case).run.values
     return SteadyLoop(values["secant_stiffness"] * u, values["loop_area"])
@@ -81,8 +76,10 @@ def find_loop(
 def depends_on_speed(rig: UndrivenRig, u: float) -> bool:
     """Return whether a friction force of a rig depends on the sliding speed at an amplitude u [m] of the slides."""
     for one in rig.interfaces:
-        slow, fast = (np.array(find_loop(one, u, omega=omega)) for omega in (1.0, TEST_RATE_RATIO))
-        if (np.abs(fast - slow) > LOOP_TOL * np.abs([slow[0], slow[0] * u])).any():
+        # Ratio of two drive frequencies at which the loops of a law are compared
+        slow, fast = (np.array(find_loop(one, u, omega=omega)) for omega in (1.0, 2.0))
+        # Relative change of a loop that is due to its steps
+        if (np.abs(fast - slow) > 1e-6 * np.abs([slow[0], slow[0] * u])).any():
             return True
     return False
 
@@ -148,9 +145,11 @@ def find_static_motions(
             """
             return np.abs(rows @ find_motion(np.abs(x) * unit, amplitude).z) / unit - x
 
-        solution = root(find_residual, stuck / unit, tol=SLIDE_ROOT_TOL)
+        # Change of the slides, relative to those of the stuck mode, at which their search ends
+        solution = root(find_residual, stuck / unit, tol=1e-13)
         motion = find_motion(np.abs(solution.x) * unit, amplitude)
-        if not (motion.omega and (np.abs(solution.fun) <= SLIDE_TOL).all()):
+        # Relative error of the slides of an equilibrium
+        if not (motion.omega and (np.abs(solution.fun) <= 1e-9).all()):
             motion = motion._replace(omega=np.nan, zeta=np.nan)
         motions.append(motion)
     return motions

@@ -21,9 +21,6 @@ import numpy as np
 
 from ..exceptions import PatchfemError
 
-# Largest product of friction coefficient and slope for which the friction loss is computed as a
-# power series; the closed form suffers from cancellation there
-MAX_SERIES_SLOPE = 0.1
 N_SLOPE_TERMS = 18  # number of terms of this series; 0.1^18 is below round-off
 
 
@@ -184,7 +181,9 @@ class Grooves:
         q0 = np.asarray(q0, float)
         q1 = np.asarray(q1, float)
         signed_friction = np.sign(q1 - q0) * friction
-        if friction * self.max_slope < MAX_SERIES_SLOPE:
+        # Largest product of friction coefficient and slope for which the friction loss is computed
+        # as a power series; the closed form suffers from cancellation there
+        if friction * self.max_slope < 0.1:
             loss = self._integrate_series(self._angle(q0), self._angle(q1), signed_friction)
         else:
             loss = self._integrate_loss(self._angle(q0), self._angle(q1), signed_friction)

@@ -12,12 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 N_ELEMENT_PARTS = 4  # number of parts into which each element but the first is divided
-# Number of times that the range of the first element is halved, with N_ELEMENT_PARTS parts per
-# halving; displacements down to 1/256 of this range then cause slip
-N_YIELD_RANGE_HALVINGS = 8
-# Largest relative difference of yield displacements for which nodes at both ends of a contact count
-# as one
-MIRRORED_YIELD_TOL = 1e-6
 
 
 class SpreadElements(NamedTuple):
@@ -45,7 +39,9 @@ def spread_elements(stiffness, yield_displacement) -> SpreadElements:
     # Nodes that yield together at both ends of a contact are one element
     k = np.asarray(stiffness, float)
     y = np.asarray(yield_displacement, float)
-    starts = np.flatnonzero(np.diff(y, prepend=-np.inf) > MIRRORED_YIELD_TOL * y)
+    # Largest relative difference of yield displacements for which nodes at both ends of a contact
+    # count as one
+    starts = np.flatnonzero(np.diff(y, prepend=-np.inf) > 1e-6 * y)
     total = np.add.reduceat(k, starts)
     y = np.add.reduceat(k * y, starts) / total
     if y.size < 2:
@@ -62,7 +58,9 @@ def spread_elements(stiffness, yield_displacement) -> SpreadElements:
 
     # The widths of the parts of the first element decrease by a constant ratio towards zero
     # displacement.
-    number = np.arange(N_ELEMENT_PARTS * N_YIELD_RANGE_HALVINGS + 1)
+    # Number of times that the range of the first element is halved, with N_ELEMENT_PARTS parts per
+    # halving; displacements down to 1/256 of this range then cause slip
+    number = np.arange(N_ELEMENT_PARTS * 8 + 1)
     borders = np.append(2.0 ** (-number / N_ELEMENT_PARTS), 0.0)
     first_fraction = -np.diff(borders)
     first_position = (borders[1:] + borders[:-1]) / 2 - 0.5

@@ -12,24 +12,11 @@ from .records import Curve
 AMPLITUDES_PER_DECADE = 6  # Number of default amplitudes per decade before points are added.
 # Ratio of the largest default amplitude to the amplitude at which the complete contact slips.
 MAX_AMPLITUDE_OVER_GROSS_SLIP = 15.0
-# Ratio of the smallest default amplitude under rigid friction to the static deflection by friction.
-MIN_AMPLITUDE_OVER_DEFLECTION = 2.0
-# Ratio of the largest amplitude to that at which a softening spring no longer returns the block.
-MAX_AMPLITUDE_OVER_SOFTENING_LIMIT = 0.7
-# Ratio of the largest amplitude to that at which a hardening spring is as stiff as the mode.
-MAX_AMPLITUDE_OVER_HARDENING_LIMIT = 3.0
-# Ratio of the travel to the largest default amplitude, so that a release can start above it.
-TRAVEL_OVER_MAX_AMPLITUDE = 1.15
-MAX_LINEAR_AMPLITUDE = 1e-3  # largest amplitude of a linear rig [m]
-N_LINEAR_AMPLITUDES = 4  # number of amplitudes of a linear rig, whose values are constant
 # Change between neighbours, as a fraction of the range of the curve, above which a point is added between them.
 MAX_CURVE_CHANGE = 0.08
 # Ratio of neighbouring amplitudes below which no point is added. A rigid contact begins to slip at once, so that its damping
 # jumps; this is the width within which the place of the jump is found.
 MIN_AMPLITUDE_SPACING_RATIO = 1.001
-MAX_CURVE_REFINEMENTS = 9  # each may halve the spacing, from the default one to the smallest
-N_EXTENSION_DECADES = 8  # number of decades by which the default range is extended to reach a force
-MAX_FORCE_INTERPOLATIONS = 8  # largest number of interpolations towards the amplitude of a force
 
 
 def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
@@ -41,7 +28,8 @@ def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
     low, high = ends[:, 0].min(), ends[:, 1].max()
     high = min(high, *(joint.model.rig.springs.travel for joint in joints))
     if joints[0].is_linear:
-        return np.geomspace(low, high, N_LINEAR_AMPLITUDES)
+        # Number of amplitudes of a linear rig, whose values are constant
+        return np.geomspace(low, high, 4)
     count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
     amplitudes = np.geomspace(low, high, count)
     for joint in joints:
@@ -53,7 +41,8 @@ def _default_range(joint: JointMode) -> tuple[float, float]:
     """Return the smallest and largest default amplitude [m] at the output of a mode (`joint`)."""
     travel = joint.model.rig.springs.travel
     if joint.is_linear:
-        high = min(MAX_LINEAR_AMPLITUDE, travel)
+        # Largest amplitude of a linear rig [m]
+        high = min(1e-3, travel)
         return 1e-3 * high, high
     low, high = joint.output_amplitude(np.array(_default_slides(joint)))
     high = min(high, _max_amplitude(joint))
@@ -69,22 +58,28 @@ def _default_slides(joint: JointMode) -> tuple[float, float]:
         high = MAX_AMPLITUDE_OVER_GROSS_SLIP * max(slip, deflection)
         return MIN_AMPLITUDE_OVER_GROSS_SLIP * slip, high
     # Rigid friction has no slip amplitude, so that the range begins above the static deflection by friction.
-    return MIN_AMPLITUDE_OVER_DEFLECTION * deflection, MAX_AMPLITUDE_OVER_GROSS_SLIP**2 * deflection
+    # Ratio of the smallest default amplitude under rigid friction to the static deflection by
+    # friction.
+    return 2.0 * deflection, MAX_AMPLITUDE_OVER_GROSS_SLIP**2 * deflection
 
 
 def _max_amplitude(joint: JointMode) -> float:
     """Return the largest default amplitude [m] at the output, within the travel and the range of a cubic spring."""
     springs = joint.model.rig.springs
-    travel = springs.travel / TRAVEL_OVER_MAX_AMPLITUDE
+    # Ratio of the travel to the largest default amplitude, so that a release can start above it.
+    travel = springs.travel / 1.15
     if not springs.cubic:
         return travel
     # The cubic spring at the output u = o q resists the mode q as much as its stiffness, |k3| u^3 o = k q, at
     # u = sqrt(k/|k3|)/o.
     output = abs(joint.modes.output[joint.mode]) or joint.reach
     limit = np.sqrt(joint.spring / abs(springs.cubic)) / output
-    factor = MAX_AMPLITUDE_OVER_HARDENING_LIMIT
+    # Ratio of the largest amplitude to that at which a hardening spring is as stiff as the mode.
+    factor = 3.0
     if springs.cubic < 0:
-        factor = MAX_AMPLITUDE_OVER_SOFTENING_LIMIT
+        # Ratio of the largest amplitude to that at which a softening spring no longer returns the
+        # block.
+        factor = 0.7
     return min(travel, factor * limit)
 
 
@@ -125,7 +120,8 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
     known = estimate_curve(joint, amplitudes)
 
     # A step that is too wide is divided at the geometric mean of its ends.
-    for _ in range(MAX_CURVE_REFINEMENTS):
+    # Each may halve the spacing, from the default one to the smallest
+    for _ in range(9):
         if known is None or known.amplitude.size < 2:
             break
         is_wide = np.zeros(known.amplitude.size - 1, bool)
@@ -176,7 +172,8 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
     known = _estimate_forces(joint, np.geomspace(low, high, count))
 
     # a wider range, decade by decade, until all forces lie inside
-    for _ in range(N_EXTENSION_DECADES):
+    # Number of decades by which the default range is extended to reach a force
+    for _ in range(8):
         added = []
         if known.force.min() > forces.min() and not joint.is_rigid:
             added.append(known.amplitude[0] / 10)
@@ -196,7 +193,8 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
 
     # interpolation in logarithms; each step adds the points that it found
     tolerance = 1e-2 * joint.model.accuracy.tolerance
-    for _ in range(MAX_FORCE_INTERPOLATIONS):
+    # Largest number of interpolations towards the amplitude of a force
+    for _ in range(8):
         # The largest force up to an amplitude leaves the first place at which a force is reached.
         largest = np.log(np.maximum.accumulate(known.force))
         amplitudes_of_forces = np.exp(np.interp(np.log(forces), largest, np.log(known.amplitude)))

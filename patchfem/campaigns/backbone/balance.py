@@ -15,9 +15,6 @@ from ...event_driven.free_motions import RATE_SCALE, ROUGH, FreeMotion, FreeMoti
 from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Curve, make_curve
 
-# Number of fixed-point steps to the damping that sustains the motion of a linear rig. They converge slowly where a force at
-# the output moves other modes; where no force holds the phase resonance, the damping grows beyond 1 or changes without end.
-N_DAMPING_ITERATIONS = 200
 # A force holds the mode if the shape of the free motion has at least MIN_MODE_ENERGY_FRACTION of the kinetic energy of the
 # motion under the force, else it holds another mode; and if this shape moves the output by what it moves in all, within
 # MAX_OUTPUT_MOTION_DEVIATION of it. At an antiresonance other modes cancel most of the motion of the mode at the output.
@@ -229,7 +226,10 @@ def _sustain_linear_motion(
     found.
     """
     rate = 0.0
-    for _ in range(N_DAMPING_ITERATIONS):
+    # Number of fixed-point steps to the damping that sustains the motion of a linear rig. They
+    # converge slowly where a force at the output moves other modes; where no force holds the phase
+    # resonance, the damping grows beyond 1 or changes without end.
+    for _ in range(200):
         rate -= 2 * _find_mode_eigenvalue(joint, rate * excitation).real
     sustained = _find_mode_eigenvalue(joint, rate * excitation)
     omega = abs(sustained)

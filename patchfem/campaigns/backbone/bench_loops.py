@@ -9,8 +9,6 @@ from ...runs.bench import bench
 from ...runs.bench.engine import steps_per_cycle
 from ...runs.rig import decays
 
-# Number of cycles of the first loop, of which the last one is evaluated.
-N_FIRST_LOOP_CYCLES = 3.0
 # Largest number of cycles: most laws are steady after a few, growing bonds after tens.
 MAX_LOOP_CYCLES = 192.0
 # Measures of a friction loop from which a backbone follows
@@ -57,7 +55,8 @@ def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> 
     tolerance = model.accuracy.tolerance
     # The contact alone: a bench, on which the displacement is prescribed.
     bench_model = replace(decays.with_automatic_method(model), kind="bench", rig=None)
-    cycles = N_FIRST_LOOP_CYCLES
+    # Number of cycles of the first loop, of which the last one is evaluated.
+    cycles = 3.0
     before = None
     while True:
         path = SlidePath(

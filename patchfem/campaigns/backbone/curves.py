@@ -34,13 +34,6 @@ from .records import (
 CURVE_FUNCTIONS = {"balance": compute_balance_curve, "quasi-static": compute_static_curve}
 # Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
 MIN_LOSS_TO_ERROR_RATIO = 4.0
-# Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
-MAX_MICRO_SLIP_AMPLITUDE_RATIO = 0.3
-# Ratio of the smallest amplitude of gross slip to the amplitude at which the complete contact
-# begins to slip.
-MIN_GROSS_SLIP_AMPLITUDE_RATIO = 3.0
-# Relative error of the flutter amplitude, smaller than the digits that are printed.
-FLUTTER_AMPLITUDE_TOL = 1e-8
 
 
 class AmplitudesOrForces(NamedTuple):
@@ -341,8 +334,11 @@ def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     relative_error = MIN_LOSS_TO_ERROR_RATIO * 2 * np.pi * curve.damping_error
     known = loss > np.maximum(ROUND_OFF_ERROR, relative_error) * energy
     slip = joint.slip_amplitude
-    micro_slip = np.flatnonzero(known & (amplitude < MAX_MICRO_SLIP_AMPLITUDE_RATIO * slip))
-    gross_slip = np.flatnonzero(known & (amplitude > MIN_GROSS_SLIP_AMPLITUDE_RATIO * slip))
+    # Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
+    micro_slip = np.flatnonzero(known & (amplitude < 0.3 * slip))
+    # Ratio of the smallest amplitude of gross slip to the amplitude at which the complete contact
+    # begins to slip.
+    gross_slip = np.flatnonzero(known & (amplitude > 3.0 * slip))
 
     # The error of a slope is the sum of the relative errors of the losses at its ends over the width.
     loss_error = (2 * np.pi * curve.damping_error + ROUND_OFF_ERROR) * energy
@@ -385,7 +381,8 @@ def _find_flutter_amplitude(joint: JointMode, curves: dict[str, Curve]) -> float
         return point.damping[0] * point.amplitude[0]
 
     try:
-        return np.exp(brentq(net_loss, *np.log(amplitudes), xtol=FLUTTER_AMPLITUDE_TOL))
+        # Relative error of the flutter amplitude, smaller than the digits that are printed.
+        return np.exp(brentq(net_loss, *np.log(amplitudes), xtol=1e-8))
     except (NotConverged, PatchfemError, ValueError):
         # No further point is known, so the root of the chord between the two points is used.
         fraction = losses[0] / (losses[0] - losses[1])

@@ -15,8 +15,6 @@ from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, par
 
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
 ASSUMED_JOINT_STIFFNESS_FRACTION = 0.1
-# Largest sum, over all modes, of the fractions of stiffness that a joint is assumed to contribute
-MAX_JOINT_STIFFNESS_FRACTION = 0.5
 # Note on a table of the scene that a backbone ignores
 IGNORED_TABLE_NOTE = (
     "[{table}] is ignored: a backbone is the motion of a mode at every amplitude, without a drive"
@@ -147,7 +145,9 @@ def _assume_slides(
 
 def _assumed_fraction(n_modes: int) -> float:
     """Return the fraction of the stiffness of each mode that is assumed to be due to the joint."""
-    return min(ASSUMED_JOINT_STIFFNESS_FRACTION, MAX_JOINT_STIFFNESS_FRACTION / n_modes)
+    # Largest sum, over all modes, of the fractions of stiffness that a joint is assumed to
+    # contribute
+    return min(ASSUMED_JOINT_STIFFNESS_FRACTION, 0.5 / n_modes)
 
 
 def _note_modes(

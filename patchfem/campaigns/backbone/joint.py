@@ -19,8 +19,6 @@ from .bench_loops import compute_steady_loop
 
 # Ratio of the smallest default amplitude to the amplitude at which the complete contact slips.
 MIN_AMPLITUDE_OVER_GROSS_SLIP = 1e-2
-# Fraction of the gross-slip amplitude at which there is no slip at all.
-STUCK_AMPLITUDE_FRACTION = 1e-5
 # End of the message where another method has a curve
 QUASI_STATIC_ADVICE = "; use --method quasi-static"
 # Reason why the friction loop of a law has no closed form
@@ -400,6 +398,7 @@ def _stuck_stiffness(joint: JointMode) -> np.ndarray:
     except PatchfemError:
         if planned.size > 1:
             return planned
-        small = STUCK_AMPLITUDE_FRACTION * joint.friction_limit / planned[0]
+        # Fraction of the gross-slip amplitude at which there is no slip at all.
+        small = 1e-5 * joint.friction_limit / planned[0]
         loop = compute_steady_loop(model, joint.patch, small, model.rig.first_mode.frequency)
         return np.array([loop.run.values["secant_stiffness"]])

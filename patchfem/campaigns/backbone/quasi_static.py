@@ -17,10 +17,6 @@ from .records import EQUAL_AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 ROUGH_RTOL = (
     1e-8  # step tolerance of the friction loops whose differences from the fine ones are the errors
 )
-# Largest number of corrections of the displacement until the amplitude is the requested one.
-MAX_AMPLITUDE_CORRECTIONS = 60
-# Relative error that is added to the estimated errors of a computed friction loop.
-MIN_RELATIVE_LOOP_ERROR = 1e-10
 
 
 def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
@@ -101,7 +97,8 @@ def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     # damping ratio, loss and force.
     load = joint.friction_limit / model.friction.static
     slides = joint.slides(amplitudes)
-    for _ in range(MAX_AMPLITUDE_CORRECTIONS):
+    # Largest number of corrections of the displacement until the amplitude is the requested one.
+    for _ in range(60):
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
             return None
@@ -148,7 +145,8 @@ def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
     for slide in slides:
         steady = compute_steady_loop(joint.model, joint.patch, float(slide), frequency)
         errors = estimate_slide_errors(steady.model, patches, steady.run, steady.steps)
-        measures = add_errors(steady.run.values, errors, min_relative_error=MIN_RELATIVE_LOOP_ERROR)
+        # Relative error that is added to the estimated errors of a computed friction loop.
+        measures = add_errors(steady.run.values, errors, min_relative_error=1e-10)
         stiffness, area = (steady.run.values[name] for name in LOOP_MEASURES)
         errors = [measures[name].error for name in LOOP_MEASURES]
         stiffness_error, area_error = np.add(errors, steady.change)

@@ -12,7 +12,6 @@ import numpy as np
 
 from .sweep_table import SweepTable
 
-MIN_CASES_OF_EXTREME = 3  # cases with a value, of which one lies between two others
 EXTREME_BAND = 0.05  # relative distance from an extreme value that is commonly called negligible
 
 
@@ -64,7 +63,8 @@ def find_extreme(table: SweepTable, name: str) -> Extreme | None:
     varied = [key for key in table.keys if key.count > 1]
     column = table.select_trusted(name)
     known = np.flatnonzero(np.isfinite(column.values))
-    if len(varied) != 1 or not varied[0].is_number or known.size < MIN_CASES_OF_EXTREME:
+    # Cases with a value, of which one lies between two others
+    if len(varied) != 1 or not varied[0].is_number or known.size < 3:
         return None
     (key,) = varied
     known = known[np.argsort(key.values[known])]

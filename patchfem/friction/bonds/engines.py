@@ -13,9 +13,6 @@ from .list_numbers import JOIN_ERROR, MAX_STRIPS, cutoff_age, find_max_age
 from .parameters import Bonds
 
 ENGINES = ("direct", "truncated", "merged", "recursion")
-# Largest change of the force due to the cut-off, as a fraction of the friction limit
-MAX_TAIL = 1e-6
-MAX_MERGE_WIDTH = 0.04  # largest merge width in bond lengths
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,9 +109,11 @@ def choose_engine(
     # A list may use a tenth of the tolerance: merging, whose error grows with the square of the width, 0.09 of the
     # tolerance, and the cut-off 0.001.
     if tail is None:
-        tail = min(1e-3 * tolerance, MAX_TAIL)
+        # Largest change of the force due to the cut-off, as a fraction of the friction limit
+        tail = min(1e-3 * tolerance, 1e-6)
     if merge is None:
-        merge = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / JOIN_ERROR))
+        # Largest merge width in bond lengths
+        merge = min(0.04, sqrt(0.09 * tolerance / JOIN_ERROR))
     if engine == "auto":
         engine = "merged" if merge > 0 else "truncated"
     tail = 0.0 if engine == "direct" else tail

@@ -17,8 +17,6 @@ from .strip_rows_kernels import (
     Strip,
 )
 
-# Half the stretch [bond lengths] over which the initial bonds are distributed, so that their force has no jump
-INITIAL_HALF_WIDTH = 1e-6
 # Path in bond lengths over which the error of a join grows e-fold for orders up to 1, and what each order above adds to it
 JOIN_AGE = 3.0
 JOIN_AGE_PER_ORDER = 2.0
@@ -106,7 +104,9 @@ def make_lists(bonds: Bonds, reach: float, merge: float, loads) -> BondLists:
     if merge:
         capacity = min(ceil(STRIPS_PER_WIDTH / merge), MAX_STRIPS)
     strips = np.zeros((loads.size, capacity + MAX_NEW_STRIPS, N_STRIP_ENTRIES))
-    half = INITIAL_HALF_WIDTH * bonds.length
+    # Half the stretch [bond lengths] over which the initial bonds are distributed, so that their
+    # force has no jump
+    half = 1e-6 * bonds.length
     unit = bonds.length**bonds.order if is_stretch else 1.0
     for point, load in enumerate(loads):
         strips[point, 0] = Strip(-half, half, 0.0, 0.0, 0.0, bonds.initial * load / unit, 0.0, 0.0)

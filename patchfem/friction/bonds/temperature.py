@@ -15,9 +15,6 @@ import numpy as np
 
 from ...core import PatchfemError
 
-# Largest argument at which exp neither overflows nor underflows, for both signs
-MAX_EXP_ARGUMENT = 600.0
-
 
 class GrowthRates(NamedTuple):
     """Growth parameters of bonds in eq. 2.10, as floats or arrays (m,).
@@ -91,7 +88,8 @@ def _scale_rate(name: str, value: float, exponent, key: str):
             f"represent such a number; lower temperature.{key}, or bring temperature.surface closer to "
             "temperature.reference"
         )
-    if (np.abs(exponent) < MAX_EXP_ARGUMENT).all():
+    # Largest argument at which exp neither overflows nor underflows, for both signs
+    if (np.abs(exponent) < 600.0).all():
         rate = value * np.exp(exponent)
     else:
         rate = np.exp(total)

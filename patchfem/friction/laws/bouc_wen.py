@@ -16,13 +16,6 @@ import numpy as np
 
 from ..protocol import SteadyLoop
 
-N_HALF_LOOP_POINTS = 20  # number of Gauss points on each piece of a half-loop
-N_INTEGRATION_PIECES = 10  # number of pieces for the integrals over a half-loop
-# Value of w = -ln(1 - y) from which 1 - y is below 1e-13 and dw/dx equals n to round-off
-SATURATED_W = 30.0
-MAX_TIP_STEPS = 200  # largest number of Newton iterations for the tip of a loop
-TIP_TOL = 1e-14  # largest change of w, relative to 1 + w, at which Newton's method has converged
-
 
 class _HalfLoop(NamedTuple):
     """Half of a steady Bouc-Wen loop, between the states -y and y.
@@ -60,10 +53,12 @@ class BoucWen:
         limit = self.static * load
         target = 2 * np.asarray(amplitude, float) / self.length
         w = np.minimum(target / 2, 1.0)
-        for _ in range(MAX_TIP_STEPS):
+        # Largest number of Newton iterations for the tip of a loop
+        for _ in range(200):
             half_loop = self._half_loop(w)
             step = (half_loop.displacement - target) / half_loop.displacement_by_w
-            if np.all(np.abs(step) <= TIP_TOL * (1 + w)):
+            # Largest change of w, relative to 1 + w, at which Newton's method has converged
+            if np.all(np.abs(step) <= 1e-14 * (1 + w)):
                 break
             w = np.maximum(w - step, w / 8)
         return SteadyLoop(limit * -np.expm1(-w), 2 * limit * self.length * half_loop.area)
@@ -95,7 +90,8 @@ class BoucWen:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             log_y = np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))
             rate = -np.expm1(self.exponent * log_y) * np.exp(w)
-        return np.where(w > SATURATED_W, self.exponent, rate)
+        # Value of w = -ln(1 - y) from which 1 - y is below 1e-13 and dw/dx equals n to round-off
+        return np.where(w > 30.0, self.exponent, rate)
 
 
 @cache
@@ -104,8 +100,10 @@ def _gauss_rule() -> tuple[np.ndarray, np.ndarray]:
 
     Fractional powers of x are smooth functions of r.
     """
-    points, weights = np.polynomial.legendre.leggauss(N_HALF_LOOP_POINTS)
-    edges = np.linspace(0.0, 1.0, N_INTEGRATION_PIECES + 1)
+    # Number of Gauss points on each piece of a half-loop
+    points, weights = np.polynomial.legendre.leggauss(20)
+    # Number of pieces for the integrals over a half-loop
+    edges = np.linspace(0.0, 1.0, 10 + 1)
     half = np.diff(edges)[:, None] / 2
     root = (edges[:-1, None] + half * (1 + points)).ravel()
     return root**4, (half * weights).ravel() * 4 * root**3

@@ -15,7 +15,6 @@ from ...effects import law_has_trait, law_supports
 from ...model import slide as model_slide
 from ..interfaces import bond_lists
 
-MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_GROOVE_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
 MIN_RELATIVE_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 
@@ -119,7 +118,8 @@ def steps_per_cycle(model) -> int:
         return steps
     path = float(np.abs(np.diff(slide.samples(steps)[1])).sum()) / max(1.0, slide.cycles or 1.0)
     phase = model.grooves.wave_number * path
-    return max(steps, min(4 * ceil(N_GROOVE_SAMPLES_PER_RADIAN * phase / 4), MAX_GROOVE_STEPS))
+    # Largest number of steps per cycle over grooves.
+    return max(steps, min(4 * ceil(N_GROOVE_SAMPLES_PER_RADIAN * phase / 4), 200_000))
 
 
 def has_changing_pressure(model) -> bool:

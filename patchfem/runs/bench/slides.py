@@ -24,10 +24,6 @@ from ..patch import jenkins_elements
 from . import masing
 from .engine import CLOSED_FORM, PARALLEL_ELEMENTS, find_method, has_changing_pressure
 
-N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
-# Largest ratio of created to dissipated energy at which the created energy counts as round-off.
-CREATED_ENERGY_ROUND_OFF = 1e-13
-
 
 @dataclass(frozen=True, eq=False)
 class SlideHistories:
@@ -288,7 +284,8 @@ def integrate_steps(slide, integrand) -> np.ndarray:
     """
     move = np.diff(slide)
     out = np.zeros_like(move)
-    for place, weight in zip(*np.polynomial.legendre.leggauss(N_GAUSS_POINTS)):
+    # Number of Gauss points per time step along the flank of a groove.
+    for place, weight in zip(*np.polynomial.legendre.leggauss(8)):
         out += 0.5 * weight * integrand(slide[:-1] + 0.5 * (1 + place) * move) * move
     return out
 
@@ -307,7 +304,8 @@ def stack_energies(work, stored, losses) -> np.ndarray:
     """
     steps = np.stack([work, np.maximum(losses, 0.0), np.maximum(-losses, 0.0)])
     work, dissipated, created = np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
-    if created[-1] <= CREATED_ENERGY_ROUND_OFF * dissipated[-1]:
+    # Largest ratio of created to dissipated energy at which the created energy counts as round-off.
+    if created[-1] <= 1e-13 * dissipated[-1]:
         created = np.zeros(created.size)
     return np.stack([work, stored, dissipated, created])
 

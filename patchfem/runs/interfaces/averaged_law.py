@@ -9,9 +9,6 @@ import numpy as np
 from ...core import PatchfemError
 from ...effects import describe_unsupported, import_effect, law_has_trait
 
-# Largest relative difference between the slip forces forward and backward that counts as zero.
-EQUAL_FRICTION_LIMITS_TOL = 1e-9
-
 
 def find_tractions(keys, patch, direction: float, offset: float = 0.0) -> np.ndarray:
     """Return the averaged pressure (m,) [Pa] at the loaded nodes of the upper piece, or 0 at open nodes.
@@ -105,7 +102,9 @@ def replace_law(keys, patch):
     static = keys.static
     if patch is not None:
         forward, back = find_loads(keys, patch).sum(axis=1)
-        if abs(forward - back) > EQUAL_FRICTION_LIMITS_TOL * max(forward, back):
+        # Largest relative difference between the slip forces forward and backward that counts as
+        # zero.
+        if abs(forward - back) > 1e-9 * max(forward, back):
             raise PatchfemError(
                 describe_unsupported(
                     f"law '{keys.law}' with a pressure that is not symmetric (slip force {forward * static:.6g} N "

@@ -39,11 +39,6 @@ MIN_CELLS_ACROSS = (
     8  # smallest number of cells along the shorter side, which resolves the free sides
 )
 MIN_GRIDS = 3  # grids after which the order of convergence shows
-# Level of the finest bricks of the free sides, which grids from the third on have; the next one takes four times as long
-MAX_SIDE_LEVEL = 2
-# Smallest error that is stated, relative to a value and to the larger terms whose difference it is; the contact is solved to
-# 1e-8 of the displacement
-MIN_RELATIVE_ERROR = 1e-7
 # Factor in the estimate of the pressure at a free side (`may_peak_at_side`); on flat blocks of nine pairs of layers, whose
 # shear moduli have ratios of 1 to 110, 64 cells needed up to 1
 MAX_SIDE_RISE = 1.25
@@ -334,7 +329,9 @@ def with_face_measures(
         larger_term = larger_terms.get(name, 0.0)
         error = errors.get(name)
         if errors:
-            min_error = MIN_RELATIVE_ERROR * max(abs(value), larger_term)
+            # Smallest error that is stated, relative to a value and to the larger terms whose
+            # difference it is; the contact is solved to 1e-8 of the displacement
+            min_error = 1e-7 * max(abs(value), larger_term)
             error = max(error, min_error, min_errors.get(name, 0.0))
         measure = make_measure(name, value, error, CELLS_SOURCE)
         measures[name] = replace(measure, floor=max(measure.floor, tolerance * larger_term))
@@ -387,7 +384,9 @@ def solve_face_on_grids(
 
     def press(level: int, coarser: "tuple[AreaPatch, ...] | None") -> "tuple[AreaPatch, ...]":
         """Press the face on the cells and bricks of a level, from the pressure on the grid before."""
-        pieces = make_cells(patch_model, counts[level], min(level, MAX_SIDE_LEVEL))
+        # Level of the finest bricks of the free sides, which grids from the third on have; the next
+        # one takes four times as long
+        pieces = make_cells(patch_model, counts[level], min(level, 2))
         if not coarser:
             return (press_face(patch_model, pieces),)
         start = _find_start(coarser[0].pressed.pressure, pieces.normal.shape)

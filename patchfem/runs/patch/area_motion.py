@@ -16,9 +16,6 @@ from ..results.patch_rows import CELLS_SOURCE, make_measure
 from . import jenkins_elements, store
 from .area import AreaPatch
 
-# Slip of a cell in a cycle, relative to the largest one, below which the cell sticks.
-MAX_STUCK_SLIP_FRACTION = 1e-2
-
 
 def find_face_reversal(result, patch: AreaPatch) -> "first_loading.ReversalState | None":
     """Find the state of a face at the last reversal of the slide.
@@ -70,7 +67,8 @@ def _find_in_frames(result) -> "first_loading.ReversalState | None":
         frames = frames[-max(2, round(len(frames) / model.slide.cycles)) :]
     active = result.patch.active
     path = np.where(active, np.abs(np.diff(frames, axis=0)).sum(axis=0), 0.0)
-    slips = path > MAX_STUCK_SLIP_FRACTION * path.max()
+    # Slip of a cell in a cycle, relative to the largest one, below which the cell sticks.
+    slips = path > 1e-2 * path.max()
     status = np.where(active, first_loading.STICK + slips, first_loading.OPEN)
     return first_loading.ReversalState(status.astype(np.int8), path)
 

@@ -16,9 +16,6 @@ from ...elasticity.elasticity import Piece, compute_interface_compliance
 from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_elastic_layers
 
-# Largest coupling of equal pieces, relative to their compliance, that is round-off of the coordinates in a mesh file
-RELATIVE_COUPLING_ROUND_OFF = 1e-7
-
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CondensedPair:
@@ -134,7 +131,9 @@ def condense(patch_model, grid, upper_grid=None, *, keep_factors: bool = True) -
 
     # The compliances hold per unit width; pairs of equal pieces act in parallel.
     normal, tangential, closing = (frozen_array(part / width) for part in compliances)
-    if np.abs(closing).max() <= RELATIVE_COUPLING_ROUND_OFF * np.abs(tangential).max():
+    # Largest coupling of equal pieces, relative to their compliance, that is round-off of the
+    # coordinates in a mesh file
+    if np.abs(closing).max() <= 1e-7 * np.abs(tangential).max():
         closing = frozen_array(np.zeros(closing.shape))
     interface = Interface(frozen_array(x), frozen_array(tributary_lengths * width), width)
 

@@ -26,8 +26,6 @@ from .condensed import CondensedPair, condense
 from .press import Patch, PressedCases, solve_patch_contact
 from .values import find_contact_edges
 
-# Number of equal columns of the grid on which the search for the contact starts.
-N_SEARCH_COLUMNS = 96
 # Largest number of columns of the coarsest grid; a layout with more columns is coarsened
 # everywhere.
 MAX_GRID_COLUMNS = 120
@@ -43,12 +41,6 @@ MAX_GRADED_CONTACT_ENDS = 12
 VARYING_LOAD_FACTORS = (0.5, 1.5)
 # Ratio of the longest cell to the length of the interface if wear may move the contact edges.
 MAX_WEAR_CELL_LENGTH_RATIO = 1 / 48
-# Number of cells along a contact of one or two nodes in the next search.
-N_SEARCH_CELLS_IN_SMALL_CONTACT = 64
-# Number of cells per wavelength of the gap, in the search and on the third grid.
-N_CELLS_PER_WAVELENGTH = 16
-# Smallest local pressure maximum, relative to the peak pressure, around which the mesh is refined.
-MIN_REFINED_PRESSURE_RATIO = 0.3
 # Number of cells of the coarsest grid per half-width of a pressure maximum.
 N_CELLS_PER_PRESSURE_HALF_WIDTH = 4
 # Number of cells in a slip zone on the coarsest grid; the third grid has 16, which give the work to
@@ -298,8 +290,9 @@ def _list_rounded_zones(patch_model, layout: Layout) -> Pairs:
 
 def _max_wave_cell(patch_model) -> float:
     """Return the longest cell [m] that resolves the waves of the gap; inf without waves."""
+    # Number of cells per wavelength of the gap, in the search and on the third grid.
     return min(
-        patch_model.gap.wave / N_CELLS_PER_WAVELENGTH,
+        patch_model.gap.wave / 16,
         np.inf if patch_model.gap.profile is None else patch_model.uniform_element_size,
     )
 
@@ -307,7 +300,8 @@ def _max_wave_cell(patch_model) -> float:
 def make_search_layout(patch_model) -> Layout:
     """Return the layout of equal columns on which the search for the contact starts."""
     half = patch_model.pieces.length / 2
-    cell = min(patch_model.pieces.length / N_SEARCH_COLUMNS, _max_wave_cell(patch_model))
+    # Number of equal columns of the grid on which the search for the contact starts.
+    cell = min(patch_model.pieces.length / 96, _max_wave_cell(patch_model))
     return Layout(-half, half, (), cell, 0.0)
 
 
@@ -334,7 +328,8 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     max_loaded_cell = min(width / 6, length / 24, max_cell)
 
     # A contact of one or two nodes is searched for again with shorter cells.
-    n_contact_cells = N_SEARCH_CELLS_IN_SMALL_CONTACT
+    # Number of cells along a contact of one or two nodes in the next search.
+    n_contact_cells = 64
     if np.isfinite(max(extent.cell for extent in extents)):
         n_contact_cells = density.n_edge_cells
     # A band along the path of a moving edge would need many cells, each of which changes the
@@ -489,10 +484,10 @@ def _find_pressure_maxima(x, sigma) -> Pairs:
 
     Both follow from parabolas through three nodal pressures.
     """
+    # Smallest local pressure maximum, relative to the peak pressure, around which the mesh is
+    # refined.
     peak_node = np.flatnonzero(
-        (sigma[1:-1] > MIN_REFINED_PRESSURE_RATIO * sigma.max())
-        & (sigma[1:-1] > sigma[:-2])
-        & (sigma[1:-1] >= sigma[2:])
+        (sigma[1:-1] > 0.3 * sigma.max()) & (sigma[1:-1] > sigma[:-2]) & (sigma[1:-1] >= sigma[2:])
     )
     slope = np.diff(sigma) / np.diff(x)
     curvature = -2 * np.diff(slope)[peak_node] / (x[peak_node + 2] - x[peak_node])

@@ -48,10 +48,6 @@ CONTACT_SOLUTION_ROUND_OFF = 5e-12  # Relative round-off error of the solved con
 MIN_REPORTED_RELATIVE_ERROR = 1e-9
 # Smallest position error of a contact edge, in cell lengths.
 MIN_CONTACT_EDGE_ERROR_IN_CELLS = 0.012
-# Ratio of the remaining increase of a corner pressure to its change by the last refinement.
-CORNER_PRESSURE_RISE_FACTOR = 4.0
-# Fraction of the corner pressure of a coating that cells longer than the coating thickness miss.
-MISSED_CORNER_PRESSURE_FRACTION = 0.15
 # Ratio of the hidden error of an extrapolated value to that of the finest mesh: 4/3 + 1/3, rounded
 # up.
 HIDDEN_ERROR_EXTRAPOLATION_FACTOR = 2.0
@@ -375,7 +371,8 @@ def _widen_errors_by_end_pressure(
     peak, fraction = (estimates.names.index(name) for name in PRESSURE_PEAK_MEASURES)
     pressure = fine.end_pressure
     growth = np.abs(pressure - coarse.end_pressure)
-    error = pressure + CORNER_PRESSURE_RISE_FACTOR * growth - estimates.values[peak]
+    # Ratio of the remaining increase of a corner pressure to its change by the last refinement.
+    error = pressure + 4.0 * growth - estimates.values[peak]
     grows = (pressure > 0) & (error > estimates.errors[peak])
     estimates.errors[peak, grows] = error[grows]
     widened = compute_fraction_error(estimates, peak, fraction)
@@ -583,7 +580,9 @@ def _compute_resolution(pressed: PressedCases, missed_peak) -> Resolution:
         thinnest = min((thickness for thickness in thicknesses if thickness > 0), default=np.inf)
         fraction = np.minimum(1.0, (all_cells[[0, -1]] / thinnest) ** 2)
         end_pressure = pressed.contact_pressure[:, [0, -1]]
-        corner_pressure = (MISSED_CORNER_PRESSURE_FRACTION * end_pressure * fraction).max(axis=1)
+        # Fraction of the corner pressure of a coating that cells longer than the coating thickness
+        # miss.
+        corner_pressure = (0.15 * end_pressure * fraction).max(axis=1)
 
     # The elastic displacement is the gap under load less that of rigid pieces in the same position
     rigid = pressed.unloaded_gap - holder.approach[:, None] + holder.turn[:, None] * pressed.x

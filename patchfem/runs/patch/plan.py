@@ -15,14 +15,6 @@ from ..results.patch_rows import Values
 from . import area, skin, store
 from .grids import MIN_NESTED_MESHES, halve_cells, make_base_grids
 
-# Tolerance below which a contact that ends inside the interface or at a step needs another
-# refinement level.
-MAX_TOL_FOR_FOURTH_MESH = 2e-3
-# Largest ratio of tilt to the opening tilt of bars at which full contact is certain. Elastic pieces
-# with height/length 0.08 to 4 open at 0.77 and above.
-MAX_FULL_CONTACT_TILT_RATIO = 0.7
-
-
 # Stiffness [N/m] of each element in series, or "rigid", by name.
 StiffnessChain = dict[str, float | str]
 
@@ -37,7 +29,9 @@ def _predict_finest_mesh(patch_model, tolerance: float) -> "Sequence[piece_meshe
         return make_piece_meshes(patch_model.with_mesh(file=None))
     bodies, contact = make_base_grids(patch_model)
     has_edges = bool(patch_model.gap.step_edges or (contact is not None and contact.places))
-    has_fourth = has_edges and tolerance < MAX_TOL_FOR_FOURTH_MESH
+    # Tolerance below which a contact that ends inside the interface or at a step needs another
+    # refinement level.
+    has_fourth = has_edges and tolerance < 2e-3
     return halve_cells(bodies, MIN_NESTED_MESHES - 1 + has_fourth)
 
 
@@ -170,9 +164,9 @@ def describe_tilt(dimensionless_groups: Values, patch_model) -> list[str]:
             "pieces are not flat"
         ]
     if tilt <= 1:
-        part = "the pieces touch everywhere" + ", except perhaps near an edge" * (
-            tilt > MAX_FULL_CONTACT_TILT_RATIO
-        )
+        # Largest ratio of tilt to the opening tilt of bars at which full contact is certain.
+        # Elastic pieces with height/length 0.08 to 4 open at 0.77 and above.
+        part = "the pieces touch everywhere" + ", except perhaps near an edge" * (tilt > 0.7)
     else:
         part = f"the pieces touch along about {100 / sqrt(tilt):.0f} % of the length or less"
     return [f"the tilt is {tilt:.3g} times the tilt at which an edge starts to open: {part}"]

@@ -15,14 +15,6 @@ from ...mesh.grid import TensorGrid
 from ..results.patch_rows import Arrays, Values
 from .press import Patch, PressedCases
 
-# Largest ratio of the curvatures of neighbouring parabolas at which the pressure curve counts as
-# smooth.
-MAX_SMOOTH_PRESSURE_CURVATURE_RATIO = 2.0
-# Smallest pressure [Pa] at an edge of a smooth layer; it keeps the logarithm finite where nothing touches
-MIN_EDGE_PRESSURE = 1e-300
-# Smallest number of contact cells on a rounded end at which its pressure peak is resolved.
-MIN_CELLS_ON_ROUNDED_END = 4
-
 
 class EdgeValues(NamedTuple):
     """Contact lengths and contact stiffnesses, which depend on the positions of the contact edges; numbers or (n,).
@@ -126,7 +118,9 @@ def _vertex_height(x, sigma, node) -> np.ndarray:
         similar = (np.take_along_axis(curvatures, neighbours, -1) / curvature).min(
             -1, keepdims=True
         )
-        fraction = np.clip(MAX_SMOOTH_PRESSURE_CURVATURE_RATIO * similar, 0.0, 1.0)
+        # Largest ratio of the curvatures of neighbouring parabolas at which the pressure curve
+        # counts as smooth.
+        fraction = np.clip(2.0 * similar, 0.0, 1.0)
         height = fraction * slope**2 / (-4 * curvature)
     return np.where((left > 0) & (right > 0) & (curvature < 0), height, 0.0)
 
@@ -289,7 +283,9 @@ def find_contact_edges(pressed: PressedCases) -> edges.ContactEdges:
     # A smooth layer has no gap, so that its edges follow from the pressure alone.
     if level.is_smooth:
         peak = pressed.pressure.max(axis=1, keepdims=True)
-        threshold = np.maximum(edges.MIN_CONTACT_PRESSURE_RATIO * peak, MIN_EDGE_PRESSURE)
+        # Smallest pressure [Pa] at an edge of a smooth layer; it keeps the logarithm finite where
+        # nothing touches
+        threshold = np.maximum(edges.MIN_CONTACT_PRESSURE_RATIO * peak, 1e-300)
         contact_edges = edges.find_pressure_edges(x, pressed.pressure, threshold)
     else:
         active = pressed.active
@@ -390,7 +386,9 @@ def unresolved_edge_rounding_pressure(pressed: PressedCases) -> np.ndarray:
             peak_width, peak = closed_forms.contact.rounded_corner_contact(
                 pressure * np.sqrt(cell), radius, modulus
             )
-            if MIN_CELLS_ON_ROUNDED_END * cell > peak_width:
+            # Smallest number of contact cells on a rounded end at which its pressure peak is
+            # resolved.
+            if 4 * cell > peak_width:
                 largest[row] = max(largest[row], peak)
     return largest
 

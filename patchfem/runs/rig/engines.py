@@ -148,10 +148,6 @@ def describe_unused_settings(model: Model, engine: str) -> list[str]:
 # Largest fraction of a cycle by which round-off changes an integer number of cycles, so that a
 # record of 30 periods has 30 cycles.
 WHOLE_CYCLE_TOL = 1e-6
-# Number of decay times after which a transient is neglected; its mean square is then reduced to
-# e^-6.
-N_TRANSIENT_DECAY_TIMES = 3.0
-MIN_SAMPLES_PER_RUN = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
 MAX_MARCH_STEPS_PER_CYCLE = 6400  # Largest automatically chosen number of time steps per cycle.
 
 
@@ -206,7 +202,9 @@ def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     # Under a random drive, the window is the whole record without its initial transient.
     if drive.waveform.is_random:
         rate = structure.drive_sizes.find_min_decay_rate(rig.modes) * drive.signal.period
-        start = min(cycles / 4, N_TRANSIENT_DECAY_TIMES / rate if rate else np.inf)
+        # Number of decay times after which a transient is neglected; its mean square is then
+        # reduced to e^-6.
+        start = min(cycles / 4, 3.0 / rate if rate else np.inf)
         window = int(max(1, cycles - start + WHOLE_CYCLE_TOL))
 
     # The window contains complete periods of a beat; the beat is within a level if the drive has levels.
@@ -219,7 +217,8 @@ def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
 
     steps = steps_per_cycle(model)
     if not structure.drive_sizes.is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
-        steps = max(steps, int(np.ceil(MIN_SAMPLES_PER_RUN / drive.cycles)))
+        # Smallest number of samples of a run with a non-sinusoidal drive.
+        steps = max(steps, int(np.ceil(100 / drive.cycles)))
     local = 0.0
     if engine is EVENT_DRIVEN:
         # A rig without friction needs few steps. Otherwise the error per step is a small part of the tolerance.

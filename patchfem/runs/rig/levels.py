@@ -27,8 +27,6 @@ from ...measures.rows import MOTION_TABLE
 
 # Relative error of the measures of an event-driven run, which has round-off only
 EXACT_RELATIVE_ERROR = 1e-9
-# Largest number of bisections of an onset; 40 of them reduce the bracket to 1e-12.
-MAX_ONSET_BISECTIONS = 40
 
 
 class LevelRuns(NamedTuple):
@@ -202,7 +200,8 @@ def find_onset(found: LevelRuns, tolerance: float, is_past_onset) -> tuple[float
     before, reached = bracket
     low = found.levels[before].drive if before >= 0 else 0.0
     high = first = found.levels[reached].drive
-    for _ in range(MAX_ONSET_BISECTIONS):
+    # Largest number of bisections of an onset; 40 of them reduce the bracket to 1e-12.
+    for _ in range(40):
         if high - low <= tolerance * (high if low else first):
             break
         middle = (low + high) / 2

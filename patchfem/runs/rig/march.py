@@ -23,9 +23,6 @@ from .evaluation import (
     find_travel,
 )
 
-# Largest move in a step of an interface that sticks rigidly, relative to the sum of the slides of its modes: round-off
-MAX_HELD_MOVE = 1e-9
-
 
 class MarchEvaluator(RunEvaluator):
     """Evaluator that computes runs with equal time steps, and measures from them.
@@ -128,7 +125,9 @@ class MarchEvaluator(RunEvaluator):
         peaks = {}
         for k, (point_set, slide) in enumerate(zip(self.contact.point_sets, window.slides.T)):
             size = np.max(np.abs(window.modal) @ np.abs(point_set.row))
-            rests = np.abs(np.diff(slide)) <= MAX_HELD_MOVE * size
+            # Largest move in a step of an interface that sticks rigidly, relative to the sum of the
+            # slides of its modes: round-off
+            rests = np.abs(np.diff(slide)) <= 1e-9 * size
             if self.contact.is_rigid(point_set) and (rests[:-1] > rests[1:]).any():
                 name = add_interface_number("friction_force_peak", k)
                 peaks[name] = float(point_set.law.limits.sum())

@@ -18,8 +18,6 @@ from ..levels import EXACT_RELATIVE_ERROR
 
 # An error is relative to the value, but at least to this fraction of the largest value of the curve, which may start at 0.
 MIN_VALUE_RATIO = 1e-3
-# Smallest interval that is halved, relative to its abscissa; it ends the refinement at a jump.
-MIN_INTERVAL_RATIO = 1e-6
 # Largest relative error of linear interpolation between the points of a response curve.
 INTERPOLATION_TOL = 0.01
 
@@ -98,7 +96,8 @@ def find_coarse_intervals(abscissas, values, tolerance: float) -> np.ndarray:
     is_coarse = np.zeros(h.size, bool)
     is_coarse[:-1] |= is_left_coarse
     is_coarse[1:] |= is_right_coarse
-    return np.flatnonzero(is_coarse & (h > MIN_INTERVAL_RATIO * np.abs(abscissas[1:])))
+    # Smallest interval that is halved, relative to its abscissa; it ends the refinement at a jump.
+    return np.flatnonzero(is_coarse & (h > 1e-6 * np.abs(abscissas[1:])))
 
 
 # Name of the measure in each column of a response curve.
@@ -109,8 +108,6 @@ COLUMN_MEASURES = {
     "acceleration_distortion": "acceleration_distortion",
 }
 SENSED_COLUMNS = ("amplitude", "acceleration_peak", "acceleration_fundamental")  # what sensors see
-# Round-off of the third harmonic of the acceleration relative to the first one.
-HARMONIC_ROUND_OFF = 1e-12
 # Reasons why a curve ends before the last frequency, by the value of `CurvePath.ended`
 REASONS_OF_END = {
     "start": "it turns back to its first frequency",
@@ -229,7 +226,8 @@ def estimate_point_errors(values: Values, relative: float = 0.0) -> Values:
     scale = EXACT_RELATIVE_ERROR + relative
     errors = {name: scale * abs(value) for name, value in values.items()}
     if "acceleration_distortion" in errors:
-        errors["acceleration_distortion"] += HARMONIC_ROUND_OFF + relative
+        # Round-off of the third harmonic of the acceleration relative to the first one.
+        errors["acceleration_distortion"] += 1e-12 + relative
     return errors
 
 

@@ -31,17 +31,9 @@ MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a pea
 POSITION_TOL = 0.1
 MIN_POSITION_TOL = 3e-4
 WIDTH_HEIGHT_FRACTION = 0.9  # Fraction of the height of a peak at which its width is measured.
-# Ratio of the shift of a peak to its width times the relative error of its height. The width is
-# measured a tenth below the peak, so that an error of a tenth shifts it by its width.
-ERROR_SHIFT_FACTOR = 10.0
 HALF_POWER = 2.0  # inverse square of the amplitude at half the power, relative to the peak
-MAX_HALF_POWER_POINTS = 4  # largest number of points that are added at each half-power point
-SHIFT_SAFETY_FACTOR = 2.0  # error of the position of a peak, relative to its last shift
 MAX_LOCAL_REACH = 0.05  # distance of a point that confirms a peak, in widths of the peak
-# Longest step beyond the highest point at an end of a curve, in widths of a peak
-MAX_STEP_OUTSIDE = 2.0
 N_VERTEX_POINTS = 4  # points of the polynomial whose vertex is the next estimate of a peak
-MAX_SHIFT_RATIO = 0.5  # ratio of two successive shifts above which the larger interval is halved
 
 
 class RefinedPeak(NamedTuple):
@@ -190,8 +182,10 @@ class CurveInProgress:
                 is_near = vertex is not None and abs(vertex.position - top) <= distance
                 reach = np.sort(np.abs(x - top))[1]
                 if is_near and shift <= distance and reach <= MAX_LOCAL_REACH * vertex.width:
-                    return PeakShift(top, SHIFT_SAFETY_FACTOR * distance, vertex.width)
-                if vertex is not None and not shift > MAX_SHIFT_RATIO * last_shift:
+                    # Error of the position of a peak, relative to its last shift
+                    return PeakShift(top, 2.0 * distance, vertex.width)
+                # Ratio of two successive shifts above which the larger interval is halved
+                if vertex is not None and not shift > 0.5 * last_shift:
                     local = MAX_LOCAL_REACH * vertex.width
                     side = distance if reach <= local else local
                     side = np.copysign(min(side, abs(farther - top) / 2), farther - top)
@@ -214,7 +208,8 @@ class CurveInProgress:
     def refine_half_power_points(self, tolerance: float) -> None:
         """Add points where the curve falls to half the power of its peak, until they stay within a part of the width [1]."""
         for direction in (-1, 1):
-            for _ in range(MAX_HALF_POWER_POINTS):
+            # Largest number of points that are added at each half-power point
+            for _ in range(4):
                 top = int(self.find_heights().argmax())
                 heights = np.nan_to_num(collect_amplitudes(self.points))
                 x = np.array(self.positions)[top::direction]
@@ -246,7 +241,8 @@ class CurveInProgress:
             length = (
                 0.5 * rise / abs(step) * width**2 / (WIDTH_HEIGHT_FRACTION**-2 - 1) - abs(step) / 2
             )
-            length = min(max(length, abs(step)), MAX_STEP_OUTSIDE * max(width, abs(step)))
+            # Longest step beyond the highest point at an end of a curve, in widths of a peak
+            length = min(max(length, abs(step)), 2.0 * max(width, abs(step)))
             return float(np.clip(self.positions[k] + np.copysign(length, step), *self.ends))
         return None
 
@@ -406,7 +402,10 @@ def solve_peak(curve: ResponseCurve, finder) -> Solution:
         number = int(np.argmax(low)) if low.any() else heights.size - 1
         far = float(distances[: number + 1].max())
 
-        shift = ERROR_SHIFT_FACTOR * error / height * measure_peak_width(heights, distances)
+        # Ratio of the shift of a peak to its width times the relative error of its height. The
+        # width is measured a tenth below the peak, so that an error of a tenth shifts it by its
+        # width.
+        shift = 10.0 * error / height * measure_peak_width(heights, distances)
         position_error = min(far, peak.shift + shift)
         max_position_error = max(max_position_error, position_error)
         neighbour = finder.compute_point_values(points[best + direction * number])
