@@ -30,6 +30,7 @@ from ..results.interfaces import Face, merge_sentences, warn_of_large_slide
 from ..results.notes import LAW_NOTES, LAW_WARNINGS
 from .engines import ENGINES, find_obstacle_of_map
 
+SAME_FREQUENCY_TOL = 1e-9  # largest relative difference at which two frequencies count as equal
 # Speed at half the friction limit of a law that creeps, relative to its reference speed: the inverse of tanh at 1/2.
 HALF_LIMIT_SPEED_RATIO = np.arctanh(0.5)
 SINGLE_POINT_WARNING = (
@@ -119,8 +120,7 @@ def _warn_of_peak(run) -> Iterator[str]:
     drive = run.model.rig.drive.signal
     ends = {"drive.from": drive.low, "drive.to": drive.high}
     for key, end in ends.items():
-        # Largest relative difference at which two frequencies count as equal.
-        if peak.value and abs(peak.value - end) <= 1e-9 * end:
+        if peak.value and abs(peak.value - end) <= SAME_FREQUENCY_TOL * end:
             side, move = ("upper", "raise") if end == max(ends.values()) else ("lower", "lower")
             yield (
                 f"the largest response lies at {key} = {format_number(end, 6)} Hz, the {side} end of the swept "
