@@ -30,7 +30,7 @@ from ..results.interfaces import Face, merge_sentences, warn_of_large_slide
 from ..results.notes import LAW_NOTES, LAW_WARNINGS
 from .engines import ENGINES, find_obstacle_of_map
 
-SAME_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
+SAME_FREQUENCY_TOL = 1e-9  # largest relative difference at which two frequencies count as equal
 # Speed at half the friction limit of a law that creeps, relative to its reference speed: the inverse of tanh at 1/2.
 HALF_LIMIT_SPEED_RATIO = np.arctanh(0.5)
 SINGLE_POINT_WARNING = (
