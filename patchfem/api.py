@@ -1219,6 +1219,7 @@ def compare(
     datum: str = "",
     predicted: str | Path | None = None,
     piece: str = "",
+    cutoff: float | None = None,
 ) -> dict[str, Any]:
     """Compare a measured surface before and after wear.
 
@@ -1243,6 +1244,8 @@ def compare(
         Results folder of a run with [wear], whose worn depth is compared with that of the traces.
     piece : str
         Piece on which the traces were measured, "upper" or "lower". Not required if both pieces wear equally.
+    cutoff : float or str, optional
+        Cut-off [m] of the roughness inside and outside of the track of traces. Default: the longest standard one that fits.
 
     Returns
     -------
@@ -1282,6 +1285,7 @@ def compare(
         shift=_parse_length(shift, "compare: shift"),
         datum=_require_string(datum, "compare: datum"),
         keep_spikes=keep_spikes,
+        cutoff=_parse_length(cutoff, "compare: cutoff"),
     )
     files = [_require_path(file, "compare") for file in files]
     _require_string(piece, "compare: piece")

@@ -48,10 +48,10 @@ def measure_interface(observations: Observations, stiffness) -> Values:
     """
     # A reversal without stick takes a time of the size of round-off.
     stuck = observations.stick[0] / observations.span
-    whole = np.round(stuck)
+    nearest = np.round(stuck)
     values = {
         "slip_amplitude": np.ptp(observations.slip, axis=-1) / 2,
-        "stick_fraction": np.where(np.abs(stuck - whole) <= FULL_STICK, whole, stuck),
+        "stick_fraction": np.where(np.abs(stuck - nearest) <= FULL_STICK, nearest, stuck),
         "friction_force_peak": np.abs(observations.force).max(axis=-1),
         "slip_start_phase": mean_slip_phase(*observations.stick[1:]),
     }

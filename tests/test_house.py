@@ -1,10 +1,12 @@
 """The counts of tokens and style breaches do not rise, and the checker finds a breach of every rule."""
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from house import (  # fmt: skip
     RULES,
+    add_rules,
     border_rules,
     count_sources,
     count_tokens,
@@ -13,9 +15,11 @@ from house import (  # fmt: skip
     lower_baseline,
     measure_rules,
     offered_names,
+    owner_rules,
     parse_source,
     quoted_name_rules,
     read_baseline,
+    row_rules,
     style_rules,
     write_baseline,
 )
@@ -42,6 +46,10 @@ PLANTED = {
     "N4": "def most(): pass",
     "N5": 'def solve(q):\n    """Solve."""',
     "N6": "MOST = 5",
+    "N7": "def solve(*, modes: int): pass",
+    "N8": "def solve_twice(): pass",
+    "N9": "def solve():\n    found = 1",
+    "K1": "force = state[3]",
     "C1": "MAX_A, MAX_B = 1, 2",
     "C2": "MAX_A = 1  # of a length",
     "C4": "\n".join(f"MAX_{k} = {k}" for k in range(13)),
@@ -77,6 +85,8 @@ def broken_rules(text: str) -> set:
         *border_rules(source.nodes, OFFERED),
         *measure_rules(source.nodes, frozenset({"loop_area"})),
         *quoted_name_rules(source, find_words([source])),
+        *owner_rules(source, Counter({"solve_twice": 2})),
+        *row_rules(source.nodes),
     )
     return {rule for rule, _, _ in found}
 
@@ -143,7 +153,7 @@ def test_refuses_count_above_baseline(tmp_path):
 
 
 def test_exact_baseline_is_only_lowered():
-    """`--lower` lowers the counts of the baseline and raises none."""
+    """`--lower` lowers the counts of the baseline and raises none; `--add` adds those of new rules."""
 
     class Present:
         """Counts of a checkout with one higher and one lower value than the baseline."""
@@ -152,3 +162,5 @@ def test_exact_baseline_is_only_lowered():
 
     lowered = lower_baseline(Present, {"patchfem/contact": {"tokens": 100, "N1": 2, "N2": 5}})
     assert lowered == {"patchfem/contact": {"tokens": 90, "N1": 2}}
+    added = add_rules(Present, {"patchfem/contact": {"tokens": 100}}, ["N1"])
+    assert added == {"patchfem/contact": {"tokens": 100, "N1": 3}}

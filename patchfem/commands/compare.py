@@ -54,6 +54,10 @@ def compare(
     datum: text_option(
         "what is known of the datum of the instrument, such as straight; then no bow is subtracted from traces"
     ) = "",
+    cutoff: text_option(
+        'cut-off of the roughness inside and outside of the track of traces, such as "0.25 mm"; default: the longest '
+        "standard one that fits"
+    ) = "",
     scene: path_option(
         "scene with a patch, such as rig.toml; the patch is pressed with each of the two surfaces in turn",
         "--scene",
@@ -77,7 +81,8 @@ def compare(
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
     length = parse_quantity(shift, "length", "compare --shift")
-    options = Options(parse_units(units), direction, length, datum, keep_spikes)
+    own_cutoff = parse_quantity(cutoff, "length", "compare --cutoff")
+    options = Options(parse_units(units), direction, length, datum, keep_spikes, own_cutoff)
     trace_options = {"--predicted": predicted, "--piece": piece}
     other_options = {"--scene": scene, "--set": set_, **trace_options}
     files = [path for path in (before, after, *other) if path is not None]
@@ -97,7 +102,11 @@ def compare(
     output = output_options.into(f"{before.resolve().stem}-{after.resolve().stem}")
     if before.is_dir() or after.is_dir():
         other_options |= {"--units": units, "--shift": shift, "--datum": datum}
-        other_options |= {"--direction": direction, "--keep-spikes": keep_spikes}
+        other_options |= {
+            "--direction": direction,
+            "--keep-spikes": keep_spikes,
+            "--cutoff": cutoff,
+        }
         _refuse_others(other_options, "results folders")
         save(lambda _: worn.answer_runs(before, after), output)
     elif scene is not None:

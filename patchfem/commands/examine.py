@@ -106,7 +106,7 @@ def _check_films() -> Finding:
     """Check whether a film of the last cycle can be written as .mp4 (patchfem view)."""
     version = find_package_version("imageio-ffmpeg")
     if which("ffmpeg") or version:
-        found = "by ffmpeg" if which("ffmpeg") else f"imageio-ffmpeg {version}"
-        return Finding("films (.mp4)", True, found, "")
+        source = "by ffmpeg" if which("ffmpeg") else f"imageio-ffmpeg {version}"
+        return Finding("films (.mp4)", True, source, "")
     cure = "run pip install imageio-ffmpeg, or write .gif or .html, which need no ffmpeg"
     return Finding("films (.mp4)", False, "neither ffmpeg nor imageio-ffmpeg, optional", cure)

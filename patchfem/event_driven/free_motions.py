@@ -43,33 +43,16 @@ from .records import (
 )
 from .runs import COARSE, COARSE_STEP, ERROR_FLOOR, estimate_error, run_case
 
-CHANGE_TOL = 1e-10  # change over half a period, relative to the motion, that counts as none
 MAX_STEPS = 1e5  # steps of the engine in the first periods of the search for a motion
-MAX_STEPS_RATIO = 30.0  # steps of the whole search, relative to those of the first periods
 # Largest changes of the two further unknowns in a Newton step: frequency and rate, relative to the frequency
 LONGEST_STEPS = np.array([0.3, 0.6])
 RATE_SCALE = 0.1  # magnitude of the rate 2 zeta omega, relative to the frequency
-# Smallest cosines between the start of the search and a motion. At a larger angle the motion is that of another mode, or
-# one whose harmonics are in resonance. A force at the output moves the modes otherwise than the free motion.
-MIN_COSINES = (0.9, 0.5)
-SAME_AMPLITUDE_TOL = 1e-3  # relative difference of amplitudes between which no slope is taken
-MAX_FOLLOWED = 20  # attempts to reach an amplitude from another one, with halved steps where no motion is found
-MIN_FOLLOWED_STEP = 0.01  # shortest of these steps, as a logarithm of the amplitude
-# Amplitudes at which the mode with sticking contacts and that without them are tried as starts, relative to that of the
-# first motion
-STUCK_RATIOS = (1e-2, 1e-4, 1e-6)
-FREE_RATIOS = (3.0, 10.0)
-STATIC_RATIOS = (1.0, 0.5, 2.0)  # the same for quasi-static motions
-STATIC_RTOL = 1e-6  # step tolerance of the friction loops of these motions
-N_SAMPLES = 64  # samples of a period for the shape of its motion
+# Amplitudes of quasi-static motions that are tried as starts, relative to that of the motion
+STATIC_RATIOS = (1.0, 0.5, 2.0)
 
-# Amplitudes at which the damping of free motions is evaluated to bracket limit cycles, relative to that of den Hartog's
-# balance, and their number
+# Amplitudes between which limit cycles are bracketed, relative to that of den Hartog's balance
 MIN_CYCLE_RATIO = 1e-6
 MAX_CYCLE_RATIO = 4.0
-N_AMPLITUDES = 48
-AMPLITUDE_TOL = 1e-12  # relative error of the amplitude of a limit cycle at which its search ends
-SLOPE_RATIO = 1.001  # ratio of the amplitudes between which the slope of the damping is taken
 NO_CYCLE_MESSAGE = "a limit cycle was not found between two amplitudes that enclose it"
 NOT_FOLLOWED_MESSAGE = (
     "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
@@ -146,11 +129,13 @@ class FreeMotion(NamedTuple):
 
     def find_shape(self) -> np.ndarray:
         """Return the first harmonic (n,) of the modal coordinates [m] as complex amplitudes."""
-        times = np.arange(N_SAMPLES // 2) * (self.shooting.period / N_SAMPLES)
+        # Samples of a period for the shape of its motion
+        n_samples = 64
+        times = np.arange(n_samples // 2) * (self.shooting.period / n_samples)
         case = replace(self.shooting.case, samples=times)
         rows = run_case(case, start=self.shooting.load_loops(self.state)).rows
         half = rows[np.isin(rows[:, 0], times), 1 : 1 + case.rig.modes.shape[1]]
-        return np.fft.rfft(np.vstack([half, -half]), axis=0)[1] * (2 / N_SAMPLES)
+        return np.fft.rfft(np.vstack([half, -half]), axis=0)[1] * (2 / n_samples)
 
     def find_multiplier(self) -> float:
         """Return the magnitude of the largest Floquet multiplier besides that of a shift in time, which is 1."""
@@ -277,6 +262,14 @@ class FreeShooting(ExtendedShooting):
 
     def _search(self) -> FreeMotion | None:
         """Find the motion by Newton's method, or None without convergence."""
+        # Change over half a period, relative to the motion, that counts as none
+        change_tol = 1e-10
+        # Steps of the whole search, relative to those of the first periods
+        max_steps_ratio = 30.0
+        # Smallest cosines between the start of the search and a motion. At a larger angle the motion is that of another
+        # mode, or one whose harmonics are in resonance. A force at the output moves the modes otherwise than the free
+        # motion.
+        min_cosines = (0.9, 0.5)
         # The laws take the states and the memory of the loop.
         laws = slice(2 * self.motions.rig.modes.omega.size, self.extra[0])
         for _ in range(N_FIRST):
@@ -285,12 +278,12 @@ class FreeShooting(ExtendedShooting):
             self.state.y[laws] = end.y[laws]
 
         # Motions far from that of the mode may take very many steps.
-        self.limit_steps(MAX_STEPS_RATIO * self.n_steps)
+        self.limit_steps(max_steps_ratio * self.n_steps)
         guess = self.state
-        found = self.find_fixed_point(CHANGE_TOL)
+        found = self.find_fixed_point(change_tol)
         if found is None:
             return None
-        is_near = self._find_cosine(guess, found[0]) > MIN_COSINES[self.motions.is_forced]
+        is_near = self._find_cosine(guess, found[0]) > min_cosines[self.motions.is_forced]
         return self._describe(found[0]) if is_near else None
 
     def _find_cosine(self, first: State, second: State) -> float:
@@ -352,19 +345,25 @@ class FreeMotions:
         FreeMotion or None
             None without convergence.
         """
+        # Relative difference of amplitudes between which no slope is taken
+        same_amplitude_tol = 1e-3
         shooting = FreeShooting(self, near.shooting.start, amplitude)
         shooting.begin_near(near)
         motion = shooting.solve()
-        if motion is None or abs(motion.amplitude / near.amplitude - 1) < SAME_AMPLITUDE_TOL:
+        if motion is None or abs(motion.amplitude / near.amplitude - 1) < same_amplitude_tol:
             return motion
         step = np.log(motion.amplitude / near.amplitude)
         return motion._replace(slope=(motion.unknowns - near.unknowns) / step)
 
     def follow(self, amplitude: float, near: FreeMotion) -> FreeMotion | None:
         """Return the motion at an amplitude [m], followed from another one `near` in steps as long as possible, or None."""
+        # Attempts to reach an amplitude from another one, with halved steps where no motion is found
+        max_followed = 20
+        # Shortest step, as a logarithm of the amplitude
+        min_followed_step = 0.01
         targets = [amplitude]
-        for _ in range(MAX_FOLLOWED):
-            if abs(np.log(targets[-1] / near.amplitude)) < MIN_FOLLOWED_STEP and len(targets) > 1:
+        for _ in range(max_followed):
+            if abs(np.log(targets[-1] / near.amplitude)) < min_followed_step and len(targets) > 1:
                 return None
             motion = self.solve(targets[-1], near)
             if motion is None:
@@ -397,6 +396,10 @@ class FreeMotions:
         -------
         list of (FreeMotion or None)
         """
+        # Amplitudes at which the mode with sticking contacts and that without them are tried as starts, relative to that
+        # of the first motion
+        stuck_ratios = (1e-2, 1e-4, 1e-6)
+        free_ratios = (3.0, 10.0)
         amplitudes = [float(amplitude) for amplitude in amplitudes]
         out: list[FreeMotion | None] = [None] * len(amplitudes)
         if similar is not None:
@@ -410,7 +413,7 @@ class FreeMotions:
 
         # Each pass follows the motions from that at the amplitude before.
         upwards = range(len(amplitudes))
-        passes = ((upwards, stuck_mode, STUCK_RATIOS), (upwards[::-1], free_mode, FREE_RATIOS))
+        passes = ((upwards, stuck_mode, stuck_ratios), (upwards[::-1], free_mode, free_ratios))
         for order, mode, ratios in passes:
             near = None
             linear = [(ratio, LinearMotion(*mode)) for ratio in (1.0, *ratios)]
@@ -429,12 +432,14 @@ class FreeMotions:
 
     def _list_static_motions(self, amplitude: float) -> Iterator[tuple[float, LinearMotion]]:
         """Yield the quasi-static motions at STATIC_RATIOS of an amplitude [m], as starts."""
+        # Step tolerance of the friction loops of these motions
+        static_rtol = 1e-6
         amplitudes = amplitude * np.array(STATIC_RATIOS)
         row = self.rig.modes.output
         if not row[self.mode] or any(is_rigid(one.law.law) for one in self.rig.interfaces):
             return
         try:
-            found = find_static_motions(self.rig, self.mode, amplitudes, row, STATIC_RTOL)
+            found = find_static_motions(self.rig, self.mode, amplitudes, row, static_rtol)
         except (NotConverged, PatchfemError):
             return
         for ratio, motion in zip(STATIC_RATIOS, found):
@@ -520,6 +525,8 @@ def find_limit_cycles(rig: UndrivenRig, limit: float) -> tuple[list[LimitCycle],
     NotConverged
         If no free motion is found at the largest amplitude.
     """
+    # Number of amplitudes at which the damping is evaluated
+    n_amplitudes = 48
     cycles = []
     min_amplitude = 0.0
     row = rig.rows[0]
@@ -527,7 +534,7 @@ def find_limit_cycles(rig: UndrivenRig, limit: float) -> tuple[list[LimitCycle],
         size = estimate_amplitude(rig.modes, row, limit, mode)
         if not size > 0:
             continue
-        amplitudes = size * np.geomspace(MIN_CYCLE_RATIO, MAX_CYCLE_RATIO, N_AMPLITUDES)
+        amplitudes = size * np.geomspace(MIN_CYCLE_RATIO, MAX_CYCLE_RATIO, n_amplitudes)
         motions = FreeMotions(rig, int(mode)).find(amplitudes)
         known = [motion is not None and not motion.sticks for motion in motions]
         if not known[-1]:
@@ -549,6 +556,10 @@ def _find_cycle_between(low: FreeMotion, high: FreeMotion) -> LimitCycle:
     It is the free motion without damping. It is stable if the damping rises over the amplitude and no other perturbation
     of the motion grows.
     """
+    # Relative error of the amplitude of a limit cycle at which its search ends
+    amplitude_tol = 1e-12
+    # Ratio of the amplitudes between which the slope of the damping is taken
+    slope_ratio = 1.001
     known = {float(np.log(motion.amplitude)): motion for motion in (low, high)}
 
     def find_rate(level: float) -> float:
@@ -561,12 +572,12 @@ def _find_cycle_between(low: FreeMotion, high: FreeMotion) -> LimitCycle:
             known[level] = motion
         return known[level].rate
 
-    cycle = known[brentq(find_rate, *known, xtol=AMPLITUDE_TOL)]
+    cycle = known[brentq(find_rate, *known, xtol=amplitude_tol)]
 
     # An error of the rate moves its root by the ratio to the slope over the amplitude.
     motions = cycle.shooting.motions
     rough = replace(motions, accuracy=ROUGH).solve(cycle.amplitude, cycle)
-    above = motions.solve(SLOPE_RATIO * cycle.amplitude, cycle)
+    above = motions.solve(slope_ratio * cycle.amplitude, cycle)
     if rough is None or above is None:
         raise NotConverged(NO_CYCLE_MESSAGE)
     slope = (above.rate - cycle.rate) / (above.amplitude - cycle.amplitude)

@@ -31,46 +31,20 @@ from .runs import MESSAGES, Motion, run_case
 MASING = LAWS.index("masing")  # number of the law whose memory are reversal points
 N_PIECES = 4  # number of pieces of its curve among its numbers
 
-# Smallest step of the derivatives of the map, relative to the scale of an unknown
-MIN_DIFFERENCE = 1e-6
-MAX_SEARCHES = 10  # searches for a motion, between which it is followed for some periods
 N_FIRST_CYCLES = 8  # cycles before the first correction
 N_RELAXED = 6  # cycles without a correction after a search that failed, and twice as many after the next one
 MAX_RELAXED = 200  # largest number of these cycles
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
 # Largest change over a periodic motion with laws of many elements, whose map has kinks close together.
 MAX_KINKED_CHANGE = 1e-6
-# Largest force at a reversal point after a correction, relative to the friction limit, which no motion exceeds; corrections
-# are exact to MAX_KINKED_CHANGE.
-MAX_FORCE_RATIO = 1 + 10 * MAX_KINKED_CHANGE
-# Largest change over a period from which one more correction leads to a motion that is followed
-MAX_FOLLOWED_CHANGE = 1e-7
 N_CHECKED = 10  # periods that such a motion is followed
-CHECK_FACTOR = 10.0  # largest distance after these periods, relative to the change of a period that counts as none
 # Largest Floquet multiplier of a stable motion; above 1, because the derivatives of the map are differences.
 MAX_STABLE_MULTIPLIER = 1 + 1e-3
 # Distance of a multiplier from 1 that differences do not resolve; a mode with a damping ratio of 3e-7 has it.
 UNDAMPED_TOL = 2e-6
-NEUTRAL_TOL = 1e-9  # distance of a multiplier from 1, relative to the largest, that counts as none
-SINGULAR_TOL = 1e-13  # the same for a correction
 # Cycles of each of three runs, in which a growing motion increases by similar amounts
 N_GROWTH_CYCLES = 60
-# Smallest ratio of a periodic motion that is never reached to the motion after these runs
-MIN_SIZE_RATIO = 1e3
-# Steps of the search for a periodic motion beside them, relative to theirs
-SEARCH_STEPS_RATIO = 3.0
-# Largest ratio of the changes over a period after and before a correction at which the derivatives of this correction
-# are used again. The ratio is about the relative change of the derivatives.
-MAX_REMAINDER = 1e-3
-MAX_NEWTON_STEPS = 20  # Newton steps to a motion from a similar one
-# Largest ratio of the changes over a period after and before such a step at which the derivatives are updated. Further
-# steps with these derivatives take a period each, new derivatives take one for each unknown.
-MAX_BROYDEN_RATIO = 0.3
-# Largest number of shortened Newton steps, and of Newton steps with new derivatives, before a search is given up
-MAX_DETOURS = 3
 MIN_STOP = 1e-9  # shortest rest of rigid friction that is counted, in periods
-MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
-MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
 
 
 class PeriodicMotion(NamedTuple):
@@ -144,6 +118,10 @@ def find_periodic_motion(
     NotConverged
         If the search needs too many steps.
     """
+    # Smallest ratio of a periodic motion that is never reached to the motion after the runs of `_measure_growth`
+    min_size_ratio = 1e3
+    # Steps of the search for a periodic motion beside these runs, relative to theirs
+    search_steps_ratio = 3.0
     growth = _measure_growth(case) if is_undamped and start is None else None
     shooting = Shooting(case, odd_laws)
     if start is not None:
@@ -152,7 +130,7 @@ def find_periodic_motion(
         motion = _search(shooting, n_first, MAX_RELAXED, has_kinks=has_kinks)
     else:
         # A growing motion leads nowhere, so that the search beside it is short.
-        shooting.limit_steps(SEARCH_STEPS_RATIO * growth.n_steps)
+        shooting.limit_steps(search_steps_ratio * growth.n_steps)
         try:
             motion = _search(shooting, n_first, N_RELAXED, has_kinks=has_kinks)
         except NotConverged:
@@ -170,7 +148,7 @@ def find_periodic_motion(
         return motion
     growth = growth or _measure_growth(case)
     size = shooting.find_size(motion.run.final) if has_converged else np.inf
-    return motion._replace(grows=bool(growth.size and size > MIN_SIZE_RATIO * growth.size))
+    return motion._replace(grows=bool(growth.size and size > min_size_ratio * growth.size))
 
 
 def _search(
@@ -251,7 +229,8 @@ def follow_periodic_motion(
     shooting = Shooting(case, odd_laws)
     shooting.state, shooting.map = start
     shooting.relax(1)
-    before, change = shooting.converge(MAX_FOLLOWED_CHANGE, N_RELAXED, MAX_KINKED_CHANGE)
+    tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
+    before, change = shooting.converge(tolerance, N_RELAXED, MAX_KINKED_CHANGE)
 
     # One more correction, after which the change is a small part of it at the start of the measured period. From a start
     # beyond its last reversal, where the force exceeds the friction limit, this period begins a period later.
@@ -307,6 +286,10 @@ class _Growth(NamedTuple):
 
 def _measure_growth(case: Case) -> _Growth:
     """Return whether the motion from the start of a case increases by similar amounts in equal times, and its size."""
+    # Smallest increase in N_GROWTH_CYCLES, relative to the motion, that is growth
+    min_growth = 1e-6
+    # Smallest ratio of the increases in the last and in the second run
+    min_growth_ratio = 0.5
     shooting = Shooting(case)
     sizes = []
     for _ in range(3):
@@ -314,7 +297,7 @@ def _measure_growth(case: Case) -> _Growth:
         sizes.append(shooting.find_size(shooting.state))
     first, second = np.diff(sizes)
     is_moving = sizes[0] > case.rig.scales[0]
-    is_growing = first > MIN_GROWTH * sizes[0] and second > MIN_GROWTH_RATIO * first
+    is_growing = first > min_growth * sizes[0] and second > min_growth_ratio * first
     return _Growth(sizes[-1] if is_moving and is_growing else 0.0, shooting.n_steps)
 
 
@@ -336,6 +319,8 @@ class Shooting:
     measures_periods = False
 
     def __init__(self, case: Case, odd_laws: Sequence[LawNumbers] = ()):
+        # Smallest step of the derivatives of the map, relative to the scale of an unknown
+        min_difference = 1e-6
         settings = case.rig.settings
         self.period = float(settings[Setting.PERIOD])
         self.odd_laws = odd_laws
@@ -361,7 +346,7 @@ class Shooting:
         # Whether the derivatives are those near the motion that was found
         self.has_exact_map = False
         # The errors of a period, of the size of the step tolerance, and of the difference are equal.
-        self.difference = max(MIN_DIFFERENCE, float(settings[Setting.RTOL]) ** 0.5)
+        self.difference = max(min_difference, float(settings[Setting.RTOL]) ** 0.5)
 
     def limit_steps(self, max_steps: float) -> None:
         """Set the largest number of steps of all periods."""
@@ -431,8 +416,10 @@ class Shooting:
         change : float
             Change over this period, relative to the scale of the state.
         """
+        # Searches for a motion, between which it is followed for some periods
+        max_searches = 10
         n_relaxed = N_RELAXED
-        for _ in range(MAX_SEARCHES):
+        for _ in range(max_searches):
             state = self.state
             found = self.find_fixed_point(tolerance, kinked)
             if found is not None:
@@ -466,17 +453,27 @@ class Shooting:
         tuple or None
             State at the start of the period, and number of periods; None without convergence.
         """
+        # Newton steps to a motion from a similar one
+        max_newton_steps = 20
+        # Largest ratio of the changes over a period after and before a correction at which the derivatives of this
+        # correction are used again. The ratio is about the relative change of the derivatives.
+        max_remainder = 1e-3
+        # Largest ratio of the changes over a period after and before a step at which the derivatives are updated.
+        # Further steps with these derivatives take a period each, new derivatives take one for each unknown.
+        max_broyden_ratio = 0.3
+        # Largest number of shortened Newton steps, and of Newton steps with new derivatives, before a search is given up
+        max_detours = 3
         step = last_residual = np.zeros(0)
         best = np.inf
         n_long = n_maps = n_regimes = 0
         is_new = False
         self.has_exact_map = False
-        for count in range(1, MAX_NEWTON_STEPS + 1):
+        for count in range(1, max_newton_steps + 1):
             before = self.state
             self.relax(1)
             change = self.measure_change(before)
             if change < tolerance or best <= change < kinked:
-                self.has_exact_map &= change <= MAX_REMAINDER * best
+                self.has_exact_map &= change <= max_remainder * best
                 # In another regime the reversal points are those that the period has left. A law that sticks may keep the
                 # direction of its last slip, which half a period reverses.
                 if self.odd_laws or self.has_same_regime(before):
@@ -486,7 +483,7 @@ class Shooting:
                 continue
             if not np.isfinite(change):
                 return None
-            if self.measures_periods and n_regimes < MAX_DETOURS and not self.odd_laws:
+            if self.measures_periods and n_regimes < max_detours and not self.odd_laws:
                 # A start in another regime gets the reversal points that the period has left.
                 if not self.has_same_regime(before):
                     n_regimes += 1
@@ -499,11 +496,11 @@ class Shooting:
             residual = self.pack(self.state) - start
             if is_new and not change < best:
                 return None
-            is_new = not change < MAX_BROYDEN_RATIO * best
-            if is_new or change > MAX_BROYDEN_RATIO:
+            is_new = not change < max_broyden_ratio * best
+            if is_new or change > max_broyden_ratio:
                 n_maps += is_new
                 self.map = None
-            elif change > MAX_REMAINDER * best:
+            elif change > max_remainder * best:
                 self.map = self.map.update(step, residual - last_residual)
             best = change
             last_residual = residual
@@ -522,7 +519,7 @@ class Shooting:
             # A long step is shortened, because the motion is then far away.
             excess = self.find_excess(step, start)
             n_long += excess > 1
-            if max(n_long, n_maps) > MAX_DETOURS or not np.isfinite(step).all():
+            if max(n_long, n_maps) > max_detours or not np.isfinite(step).all():
                 return None
             if excess > 1:
                 step /= excess
@@ -534,15 +531,18 @@ class Shooting:
 
         With such forces a loop far away from the motion would repeat itself. One element reverses at its limit alone.
         """
+        # Largest force at a reversal point after a correction, relative to the friction limit, which no motion exceeds;
+        # corrections are exact to MAX_KINKED_CHANGE.
+        max_force_ratio = 1 + 10 * MAX_KINKED_CHANGE
         faces = self.case.rig.faces
         for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
             memory = self.state.memory[i]
             forces = memory[Memory.STACK + 1 : Memory.STACK + 2 * int(memory[Memory.COUNT]) : 2]
             limit = faces[i, Face.NUMBERS + masing.LIMIT]
-            if np.abs(forces).max(initial=0.0) > MAX_FORCE_RATIO * limit:
+            if np.abs(forces).max(initial=0.0) > max_force_ratio * limit:
                 return False
             least = np.abs(forces).min(initial=np.inf)
-            if _has_single_element(faces[i]) and least * MAX_FORCE_RATIO < limit:
+            if _has_single_element(faces[i]) and least * max_force_ratio < limit:
                 return False
         return True
 
@@ -556,11 +556,13 @@ class Shooting:
         error : float
             Distance after these periods, enlarged for a distance that decays slowly.
         """
+        # Largest distance after the N_CHECKED periods, relative to the change of a period that counts as none
+        check_factor = 10.0
         self.state = before
         self.relax(N_CHECKED)
         distance = self.measure_change(before)
-        if distance <= CHECK_FACTOR * tolerance:
-            return np.zeros(0), CHECK_FACTOR * distance
+        if distance <= check_factor * tolerance:
+            return np.zeros(0), check_factor * distance
         return np.array([(distance / tolerance) ** (1 / N_CHECKED)]), np.inf
 
     def scales(self) -> np.ndarray:
@@ -668,11 +670,13 @@ class Shooting:
 
     def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
         """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""
+        # Distance of a multiplier from 1, relative to the largest, that counts as none
+        neutral_tol = 1e-9
         found, change = self.differentiate(before)
         if not np.isfinite(found.slopes).all():
             return np.full(change.size, np.nan), np.inf
         # A state that nothing determines, such as that of an interface at rest, has no error.
-        step = _solve_newton(found, change, NEUTRAL_TOL)
+        step = _solve_newton(found, change, neutral_tol)
         multipliers = np.linalg.eigvals(found.slopes)
         return multipliers**2 if self.odd_laws else multipliers, float(
             np.abs(step).max(initial=0.0)
@@ -684,11 +688,13 @@ class Shooting:
         Regimes are those at the end of the period, where the motion has brought them. Without finite derivatives the state
         remains.
         """
+        # Singular values below it, relative to the largest one, count as 0
+        singular_tol = 1e-13
         period_map, change = self.differentiate(before)
         if not np.isfinite(period_map.slopes).all():
             return
         packed = self.pack(self.state)
-        step = _solve_newton(period_map, change, SINGULAR_TOL) * period_map.scale
+        step = _solve_newton(period_map, change, singular_tol) * period_map.scale
         packed[period_map.columns] = self.pack(before)[period_map.columns] + step
         self.state = self.unpack(self.state, packed)
 

@@ -405,7 +405,7 @@ def _format_measure(name: str, measures: Quantities) -> str:
 def _is_release(result: Result) -> bool:
     """Return whether a run is a free motion after a release."""
     rig = result.plan.model.rig
-    return rig is not None and rig.drive.kind == "free"
+    return rig is not None and rig.drive.is_release
 
 
 def describe_release(result: Result) -> tuple[str, str]:

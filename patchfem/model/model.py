@@ -249,21 +249,11 @@ def _build(scene: Scene) -> Model:
         point = slide.build_point_load(scene, rig_model)
         grooves = slide.build_grooves(scene)
 
-    # The mesh of a patch is finer where contact edges move, or where partial slip must be resolved
     laws = build_interface_laws(scene) if rig_model is None else rig_model.friction.interfaces
     law = laws[0].numbers if laws else None
     if patch_model is not None:
-        if law is not None and law.static == 0:
-            # Without friction no shear stress deforms the pieces.
-            still = replace(patch_model.interface, partial_slip="")
-            patch_model = replace(patch_model, interface=still)
-        edge_motion = _find_edge_motion(scene, rig_model)
-        is_fine = rig_model is None and scene.wear is None
-        patch_model = patch_model.with_mesh(edge_motion=edge_motion, is_fine=is_fine)
-        if patch_model.area is not None:
-            area = patch_model.area._replace(max_cells=_find_max_cells(scene, patch_model))
-            patch_model = replace(patch_model, area=area)
-        elif path is not None and grooves is None:
+        patch_model = _choose_mesh(scene, patch_model, rig_model, law)
+        if patch_model.area is None and path is not None and grooves is None:
             patch_model = _request_slip_mesh(patch_model, path, law)
 
     # The source is added last, because the resolved scene has defaults that follow from the model.
@@ -297,6 +287,25 @@ def _build(scene: Scene) -> Model:
     )
     model = replace(model, source=source)
     return model if model.has_bolted_patch else model.state_subtracted_joint()
+
+
+def _choose_mesh(scene: Scene, patch_model: PatchModel, rig_model: Rig | None, law) -> PatchModel:
+    """Return the patch of a scene with what its mesh depends on.
+
+    The mesh is finer where contact edges move, or where partial slip must be resolved. `law` are the keys of the friction
+    law, or None.
+    """
+    if law is not None and law.static == 0:
+        # Without friction no shear stress deforms the pieces.
+        still = replace(patch_model.interface, partial_slip="")
+        patch_model = replace(patch_model, interface=still)
+    edge_motion = _find_edge_motion(scene, rig_model)
+    is_fine = rig_model is None and scene.wear is None
+    patch_model = patch_model.with_mesh(edge_motion=edge_motion, is_fine=is_fine)
+    if patch_model.area is None:
+        return patch_model
+    area = patch_model.area._replace(max_cells=_find_max_cells(scene, patch_model))
+    return replace(patch_model, area=area)
 
 
 def _find_max_cells(scene: Scene, patch_model: PatchModel) -> int:

@@ -86,6 +86,11 @@ class RigDrive:
     force: float | None
     levels: DriveLevels = DriveLevels()
 
+    @property
+    def is_release(self) -> bool:
+        """Whether the rig is released from a displacement, and then not driven."""
+        return self.kind == "free"
+
 
 @array_dataclass
 class RigFriction:

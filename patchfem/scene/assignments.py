@@ -163,12 +163,12 @@ def read_assignments(
 
     Returns
     -------
-    given : list of Axis or Range
+    axes : list of Axis or Range
         A Range for a key with a range without a number of values, else an Axis with the values.
     mistakes : list of str
         A sentence for each mistake.
     """
-    given: list[Axis | Range] = []
+    axes: list[Axis | Range] = []
     mistakes = []
     texts = list(texts)
     if texts and not form.has_lists:
@@ -176,14 +176,14 @@ def read_assignments(
     for text in texts:
         key, values = split_assignment(text)
         if key and values:
-            _append_values(given, mistakes, f"{form.option} {key}", (key, values), form)
+            _append_values(axes, mistakes, f"{form.option} {key}", (key, values), form)
         else:
             mistakes.append(f"{form.option} {text}: write {form.usage}")
     if not (texts or form.has_lists):
         mistakes.append(f"{form.option}: at least one range is needed, {form.usage}")
-    counts = Counter(item.key for item in given)
+    counts = Counter(item.key for item in axes)
     mistakes += [f"{form.option} {key}: is given twice" for key in counts if counts[key] > 1]
-    return given, mistakes
+    return axes, mistakes
 
 
 def read_table(table: TomlValue) -> tuple[list[Axis], list[tuple[str, str]]]:

@@ -70,7 +70,7 @@ def draw_random_record(
         If the band reaches beyond the spectrum, or has fewer than `MIN_SPECTRAL_LINES` lines, 1/duration apart.
     """
     ends = [float(frequency[0]), float(frequency[-1])]
-    low, high = (end if given is None else given for given, end in zip(band, ends))
+    low, high = (end if limit is None else limit for limit, end in zip(band, ends))
     if low < ends[0] or high > ends[1]:
         raise PatchfemError(
             f"{low:g} to {high:g} Hz reach beyond the spectrum, which is given only from {ends[0]:g} to {ends[1]:g} Hz",

@@ -107,7 +107,7 @@ class Reduction(NamedTuple):
         return selection
 
 
-def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> Reduction:
+def reduce_matrices(K, M, C, boundary, n_modes: int, method: str, moved=None) -> Reduction:
     """Reduce the sparse matrices of a structure to its boundary and its lowest modes.
 
     The matrices are projected on natural modes and on static shapes, one for each coordinate of the boundary.
@@ -118,7 +118,7 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
         Stiffness [N/m], mass [kg] and damping [N s/m]; C may be None.
     boundary : (b,) array_like of int
         Rows of the boundary coordinates, from 0.
-    modes : int
+    n_modes : int
         Number of modes to keep; more are computed for the error estimate.
     method : str
         ``"craig-bampton"`` or ``"free-interface"``.
@@ -144,7 +144,7 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
     # More modes are computed than are kept, because a run with all of them gives the error of a run with the kept ones.
     # Number of computed modes beyond twice the retained number, because the run for the error
     # estimate retains more modes
-    count = 2 * modes + 4
+    count = 2 * n_modes + 4
     with use_one_blas_thread():
         shapes, computed = compute_shapes(K.tocsc(), M.tocsc(), np.asarray(boundary), count, load)
         stiffness = _project(K, shapes, PROJECTION_TOL)
@@ -366,7 +366,7 @@ def _expand_rows(shapes, rows, n: int) -> np.ndarray:
 
 def build_basis(
     reduction: Reduction,
-    modes: int,
+    n_modes: int,
     pairs=(),
     output: int = 1,
     driven_mass: int | None = None,
@@ -382,7 +382,7 @@ def build_basis(
     ----------
     reduction : Reduction
         Matrices projected on modes and static shapes.
-    modes : int
+    n_modes : int
         Number of modes to keep; all if fewer were computed.
     pairs : sequence of (i, j)
         Interfaces between boundary coordinates, from 1 on and 0 for the base; the slide is x_i - x_j.
@@ -404,7 +404,7 @@ def build_basis(
     PatchfemError
         If mass or stiffness is not positive.
     """
-    n_modes = min(modes, reduction.modes.omega.size)
+    n_modes = min(n_modes, reduction.modes.omega.size)
     n_boundary = len(reduction.boundary)
     selection = reduction.select_modes(n_modes)
     mass = selection.T @ reduction.mass @ selection

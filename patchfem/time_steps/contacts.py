@@ -44,6 +44,20 @@ class LowerPressure(NamedTuple):
     tables: tuple[np.ndarray, ...]
 
 
+class Press(NamedTuple):
+    """Patch of m nodes whose pressure changes with heave and pitch.
+
+    - sets: its contact sets
+    - heave, pitch (n,): motions of the holder per modal coordinate
+    - averages (2, m, m - 1, 2): weights of the nodal forces in averages for slides to +x and -x, or None
+    """
+
+    sets: "ContactSets"
+    heave: np.ndarray
+    pitch: np.ndarray
+    averages: np.ndarray | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class PointSet:
     """Contact points that act on one port, that is, on one displacement of the rig such as the slide of an interface.
@@ -97,26 +111,21 @@ class Contact:
     - point_sets: interfaces, then springs
     - limit: friction limit of all interfaces [N], or another force by which residuals are measured
     - length: elastic length of the first interface [m]
-    - sets: contact sets of a patch whose pressure changes with heave and pitch
-    - heave, pitch (n,): motions of the holder per modal coordinate, with `sets`
+    - press: patch whose pressure changes with heave and pitch, or None
     - load: function of times (k,) [s] that returns a prescribed load [N]
-    - preload: load at the start [N], with `sets`, `load` or `grooves`
+    - preload: load at the start [N], with `press`, `load` or `grooves`
     - grooves: grooves whose flanks the first interface climbs
     - elements: set whose elements are the points, or None
-    - averages (2, m, m - 1, 2): weights of the nodal forces of `sets` in averages for slides to +x and -x, or None
     """
 
     point_sets: list[PointSet]
     limit: float = 0.0
     length: float = 0.0
-    sets: "ContactSets | None" = None
-    heave: np.ndarray | None = None
-    pitch: np.ndarray | None = None
+    press: Press | None = None
     load: Callable[[np.ndarray], np.ndarray] | None = None
     preload: float = 1.0
     grooves: Grooves | None = None
     elements: "JenkinsSet | None" = None
-    averages: np.ndarray | None = None
 
     def is_rigid(self, point_set: PointSet) -> bool:
         """Return whether a set of points sticks without displacement."""
@@ -157,6 +166,6 @@ class Contact:
     @property
     def has_loads(self) -> bool:
         """Whether the load of a point changes, by the motion, with time, or as it slides."""
-        parts = [self.sets, self.load, self.grooves]
+        parts = [self.press, self.load, self.grooves]
         parts += [point_set.lower for point_set in self.point_sets]
         return any(part is not None for part in parts)

@@ -127,9 +127,9 @@ def make_system(
     rows = [np.zeros(n) if modes is None else point_set.row for point_set in contact.point_sets]
     press = np.zeros(11)
     press[:2] = -1.0
-    if contact.sets is not None:
+    if contact.press is not None:
         press[:2] = len(rows), len(rows) + 1
-        rows += [contact.heave, contact.pitch]
+        rows += [contact.press.heave, contact.press.pitch]
     rows = np.array(rows, float).reshape(len(rows), n)
 
     # Responses of the modes; a prescribed slide has none.
@@ -177,7 +177,7 @@ def make_system(
     state = np.zeros((3, 2 * n))
     if start is not None:
         state[0] = [*start.z, *start.v]
-    sets = make_no_sets() if contact.sets is None else contact.sets.make_arrays()
+    sets = make_no_sets() if contact.press is None else contact.press.sets.make_arrays()
     flank = make_flank(contact)
     totals = np.zeros(len(Total))
     system = System(structure, ports, points, flank, sets, state, totals, options)
@@ -206,7 +206,7 @@ def _set_start(system: System, contact) -> None:
     limits = points.numbers[:, WIDTH] * np.where(velocities < 0, back, load)
     points.memory[is_rigid, 0] = np.sign(velocities)[is_rigid]
     values[is_rigid, Value.START // WIDTH, 0] = (limits * points.memory[:, 0])[is_rigid]
-    if contact.sets is not None:
+    if contact.press is not None:
         press_first(system, contact)
     if contact.grooves is not None and n:
         _climb_first(system, contact)
@@ -338,8 +338,9 @@ def _make_points(contact, n_ports: int) -> Points:
     shear = np.zeros((len(Shear), stiffness.size))
     parts = [shapes[k, WIDTH * begin : WIDTH * end] for k, (begin, end) in enumerate(bent)]
     shear[Shear.SCALE] = [np.sqrt(np.count_nonzero(part) / (part @ part)) for part in parts]
-    n_nodes = 0 if contact.sets is None else contact.sets.x.size
-    n_averaged = 0 if contact.averages is None else 2 * n_nodes + 2
+    averages = None if contact.press is None else contact.press.averages
+    n_nodes = 0 if contact.press is None else contact.press.sets.x.size
+    n_averaged = 0 if averages is None else 2 * n_nodes + 2
     laws = [_number_law(point_set.law.law) for point_set in sets]
     layout = Layout(
         np.repeat(laws, counts).astype(np.int64),
@@ -353,7 +354,7 @@ def _make_points(contact, n_ports: int) -> Points:
         *(np.hstack(array) for array in (node, share, place)),
         pressure,
         np.zeros(n_nodes),
-        np.zeros((0, 0, 0, 0)) if contact.averages is None else contact.averages,
+        np.zeros((0, 0, 0, 0)) if averages is None else averages,
         np.zeros(n_averaged),
     )
     products = np.zeros((stiffness.size, 2))
@@ -453,10 +454,11 @@ def make_no_sets():
 def press_first(system: System, contact: Contact) -> None:
     """Find the contact set of a patch at the start, and write its index to the counters of `system.sets`."""
     press = kernel_cache.load_compiled_module("contact.press_kernels")
-    name = hash_set(system.sets, contact.sets.in_contact)
+    name = hash_set(system.sets, contact.press.sets.in_contact)
     n = system.state.shape[1] // 2
     heave, pitch = (
-        float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch)
+        float(np.dot(row, system.state[0, :n]))
+        for row in (contact.press.heave, contact.press.pitch)
     )
     slot = press.find_set(system.sets, press.build_first_set(system.sets, name), -heave, pitch)
     system.sets.counters[PRESENT_SLOT_INDEX] = slot

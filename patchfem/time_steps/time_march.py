@@ -136,7 +136,7 @@ def load_kernels(contact: Contact, say=None):
     """
     kernel_cache.report_compilation_to(say)
     parts = {}
-    if contact.sets is None:
+    if contact.press is None:
         parts["normal"] = "time_steps.no_normal_kernels"
     step_parts = dict(parts)
     if not contact.has_lists:
@@ -200,7 +200,7 @@ class March:
         self.first_step = self.step
         self.outcome = None
         self.message = ""
-        n_columns = len(contact.point_sets) + (2 if contact.sets is not None else 0)
+        n_columns = len(contact.point_sets) + (2 if contact.press is not None else 0)
         self.width = 2 * modes.omega.size + Sample.PORTS + N_PORT_COLUMNS * n_columns
         self.kernels = load_kernels(contact)
         self.reset_balance()
@@ -750,12 +750,12 @@ def make_histories(run: March, rows) -> Response:
     stored = rows[:, 2 * n + Sample.ENERGY]
     extra = {"ledger": np.insert(energies, Energy.DISSIPATED, stored, axis=0)}
     press = rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PITCH + 1]
-    if contact.sets is not None or contact.load is not None:
+    if contact.press is not None or contact.load is not None:
         extra |= dict(zip(PRESS_COLUMNS, press.T))
-    if contact.sets is not None:
+    if contact.press is not None:
         # Less load accelerates the holder towards the contact.
-        change = press[:, :2] - [contact.sets.load, contact.sets.moment]
-        pull = pull - change @ np.array([contact.heave, contact.pitch])
+        change = press[:, :2] - [contact.press.sets.load, contact.press.sets.moment]
+        pull = pull - change @ np.array([contact.press.heave, contact.press.pitch])
 
     # Relative displacement and velocity of each port; several interfaces have histories of their own.
     slides = z @ port_rows.T

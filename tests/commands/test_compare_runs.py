@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+import xarray
 from command_line import read_json, read_page, run_cli, run_successfully
+from page_data import read_charts
 from scene_texts import COULOMB, POINT
 from test_compare_verb import NAMES
 
@@ -30,6 +32,11 @@ SCENES = {
     "pressed": TILTED,
     "half": TILTED + COULOMB + SINE + WEAR + "1e5\n",
     "worn": TILTED + COULOMB + SINE + WEAR + f"{MANY:g}\n",
+    "stuck": TILTED
+    + COULOMB.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"')
+    + SINE.replace("10 um", "1 nm")
+    + WEAR
+    + "1e5\n",
     "point": POINT + COULOMB + SINE + WEAR + "1e5\n",
     "other": TILTED.replace("0.1 mrad", "0.2 mrad"),
 }
@@ -136,6 +143,36 @@ def test_exact_compare_command_agrees_with_python(result_folders, tmp_path):
     table = np.loadtxt(tmp_path / "out/depth.csv", delimiter=",", skiprows=1)
     assert table[:, 3].max() == found["worn_depth_max"]["value"]
     assert table[:, 2] - table[:, 1] == pytest.approx(table[:, 3], abs=1e-18)
+
+
+def test_exact_charts_show_last_state_and_loop_of_each_run(result_folders, tmp_path):
+    """The chart of the pressure shows the last frame of each run; the loops have the friction limit, 30 N, and the slide."""
+    names = ("half", "worn")
+    run_successfully("compare", *(result_folders / name for name in names), "-o", tmp_path / "out")
+    charts = read_charts(read_page(tmp_path / "out"))
+    for name, curve in zip(names, charts["Pressure on the interface"]["data"], strict=True):
+        with xarray.open_dataset(result_folders / name / "result.nc") as data:
+            pressure = data["normal_stress"].values[-1]
+        np.testing.assert_allclose(curve["y"], pressure * 1e-6, rtol=1e-6)
+    for loop in charts["Friction loops"]["data"]:
+        assert np.ptp(loop["y"]) == pytest.approx(60.0) and np.ptp(loop["x"]) == pytest.approx(20.0)
+
+
+def test_exact_patch_that_sticks_wears_nothing(result_folders, tmp_path):
+    """A run without slip has no wear: the verdict says so, and no wear coefficient is fitted to it."""
+    found = pf.compare(result_folders / "pressed", result_folders / "stuck")
+    assert found["verdict"].startswith("Nothing wore off between the two runs.")
+    worn = pf.compare(result_folders / "pressed", result_folders / "worn")
+    assert worn["verdict"].startswith("Worn depth ")
+    x = np.arange(1271) * 10.0
+    z = np.random.default_rng(20300115).normal(size=x.size)
+    traces = tmp_path / "a.csv", tmp_path / "b.csv"
+    for path, depth in zip(traces, (0.0, 6.0), strict=True):
+        heights = z - depth * (np.abs(x - 6350.0) < 3000.0)
+        rows = "".join(f"{a},{b:.4f}\n" for a, b in zip(x, heights))
+        path.write_text("x [um],z [um]\n" + rows)
+    answer = run_cli("compare", *traces, "--predicted", result_folders / "stuck")
+    assert answer.code == 2 and "stuck: nothing wore off in this run" in answer.err
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,8 @@
 """Output of a run on the screen: verdict, key numbers in readable units, one line for each file; no output with -q."""
 
+import re
 import shlex
+from pathlib import Path
 
 import pytest
 from command_line import read_json, run_cli
@@ -9,6 +11,17 @@ from page_data import find_wrong_numbers
 from patchfem.__main__ import VERB_GROUPS, app, register_verbs
 from patchfem.export import quantities
 from patchfem.scene import read_template
+
+FILE_ENDINGS = {
+    ".toml",
+    ".csv",
+    ".html",
+    ".png",
+    ".pvd",
+    ".uff",
+    ".vtu",
+    ".json",
+}  # of files in examples
 
 
 def run_template(tmp_path, kind, *words, **keys):
@@ -100,3 +113,5 @@ def test_always_help_has_valid_example_of_every_command():
             [verb, *shlex.split(example)], exit_on_error=False, print_error=False
         )[0]
         assert read.__name__.rstrip("_") == verb
+        files = [word for word in example.split() if re.fullmatch(r"[\w/]+\.[a-z]+", word)]
+        assert {Path(file).suffix for file in files} <= FILE_ENDINGS, example

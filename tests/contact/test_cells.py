@@ -15,6 +15,7 @@ from patchfem.contact.cell_edges import compute_contact_stiffness, find_row_edge
 from patchfem.contact.cells import CellCompliance
 from patchfem.contact.press_cells import press_cells
 from patchfem.contact.waves import compute_wave_compliance
+from patchfem.core import NotConverged
 from patchfem.elasticity import BlockShape, Layers, LayerStack, Piece, make_stack
 from patchfem.elasticity.elasticity import lame_constants
 from patchfem.mesh import TensorGrid
@@ -212,6 +213,24 @@ def test_exact_disc_with_two_free_tilts(radius=1e-3, n_cells=128):
     tilts = -3 * LOAD * line / (4 * MODULUS * radius**3)
     assert pressed.approach == pytest.approx(LOAD / (2 * MODULUS * radius), rel=3e-3)
     assert (pressed.tilt_x, pressed.tilt_y) == pytest.approx(tilts, rel=8e-3)
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_refuses_load_line_beyond_cells(axis, length=1e-3):
+    """A load outside the outermost cells tilts a free holder without end; a spring of the holder balances it."""
+
+    def press(place, **springs):
+        """Press a parabola by a load at a place along the axis."""
+        loading = FaceLoading(LOAD, **{f"line_{axis}": place}, **springs)
+        return press_open((24, 24), (length, length), lambda x, y: x**2 + y**2, loading)[1]
+
+    with pytest.raises(
+        NotConverged, match=r"load line at 0\.0006 m lies beyond .* at 0\.00047917 m"
+    ):
+        press(0.6 * length)
+    held = press(0.6 * length, **{f"spring_{axis}": 1e4})
+    assert held.pressure.sum() * (length / 24) ** 2 == pytest.approx(LOAD, rel=1e-8)
+    assert press(0.05 * length).pressure.max() > 0
 
 
 @pytest.mark.parametrize("wave", [(1, 0), (1, 1)])

@@ -323,6 +323,10 @@ def test_refuses_curved_elements_nonplanar_meshes_and_unknown_tags(tmp_path):
         ("*NODE", "*Part, name=A\n*NODE", r"\*PART: parts .*noPartsInputFile=ON\) writes a flat"),
         ("*NODE", "*Instance, name=A-1, part=A\n*NODE", r"\*INSTANCE: parts and instances"),
         ("\n8, ", "\n5, ", "node 5 is given twice"),
+        *(
+            ("*NODE", f"*{word}\n1\n*NODE", rf"\*{word} is not supported yet; write a flat deck")
+            for word in "INCLUDE SYSTEM NGEN NFILL ELGEN NCOPY ELCOPY".split()
+        ),
     ],
 )
 def test_refuses_decks_of_other_elements_and_of_parts(old, new, message, tmp_path):

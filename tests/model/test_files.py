@@ -49,7 +49,13 @@ def make_matrices(**changes) -> bytes:
     return content.getvalue()
 
 
+RANDOM_HEIGHTS = np.random.default_rng(20300114).normal(size=4001)
+ROUGH_TRACE = "x [um],z [um]\n" + "".join(f"{k},{z:.4f}\n" for k, z in enumerate(RANDOM_HEIGHTS))
 FAULTS = {
+    "asperities, cut-off below the steps of the trace": (
+        COATED + '[contact.asperities]\nlaw = "hertz"\ncutoff = "3 um"\nfrom = "{}"\n', "t.csv", ROUGH_TRACE,
+        "contact.asperities.from", "a cut-off of 3 um is shorter than 4 steps of 1 um",
+    ),
     "profile": (PROFILE, "a.csv", "0,1\n1,2\n", "contact.profile.file", "a.csv:1: the unit of x is not given"),
     "profile, short": (PROFILE, "a.csv", "x [mm],z [um]\n0,1\n2,2\n4,1\n", "contact.profile.file",
                        "the profile is 4 mm long, but the patch is 12.7 mm"),
@@ -81,7 +87,7 @@ def test_refuses_faulty_file_at_its_scene_line(tmp_path, text, name, content, ke
     scene."""
     code, lines = check_scene_with_file(tmp_path, text, name, content)
     assert code == 2 and len(lines) == 1, lines
-    number = find_line(text, "mesh = " if key == "contact.mesh" else "file = ")
+    number = find_line(text, f"{key.rpartition('.')[2]} = ")
     assert (
         lines[0].startswith(f"{tmp_path / 'scene.toml'}:{number}: {key}: ") and message in lines[0]
     )

@@ -125,6 +125,20 @@ def test_exact_sliding_speed_of_a_rig_is_that_of_its_interface():
     assert partial.bonds.rest_speed == pytest.approx(0.64 * bonds.bonds.rest_speed, rel=1e-12)
 
 
+def test_exact_layers_in_series_add_their_compliance():
+    """A compliance of 2 per length gives twice the height of both pieces, coated or not; equal pairs share the load."""
+    pieces = build(loads(SMALL_PATCH)).patch.pieces
+    assert pieces.lower.thickness > 0
+    for coating in (pieces.lower.coating, None):
+        lower = replace(pieces.lower, coating=coating)
+        stack = replace(pieces, lower=lower)
+        heights = stack.lower.height + stack.upper.height
+        compliance = stack.series_compliance(lambda _: 2.0)
+        assert compliance == pytest.approx(2 * heights / (stack.length * stack.width), rel=1e-12)
+        pairs = replace(stack, pairs=3 * stack.pairs)
+        assert pairs.series_compliance(lambda _: 2.0) == pytest.approx(compliance / 3, rel=1e-12)
+
+
 # ---- runs of a model
 
 

@@ -15,9 +15,9 @@ from varying_load_cases import (
     LOAD,
     MASS,
     STILL,
-    check_energy_of_random_march,
-    check_order_two,
     crowned_contact,
+    find_convergence,
+    find_faults_of_random_march,
     make_contact,
     make_modes,
     march_pressed,
@@ -115,7 +115,8 @@ def test_exact_bouncing_block_conserves_energy_and_solves_contact(n_slots):
 def test_order_two_for_combined_slide_heave_and_pitch(name):
     """With modes that combine slide, heave and pitch and a varying contact the march converges with
     order two."""
-    check_order_two(name, 1600, 0.35)
+    found = find_convergence(name, 1600)
+    assert found.order == pytest.approx(2, abs=0.35) and found.change <= 2e-3
 
 
 @pytest.mark.parametrize(
@@ -131,7 +132,8 @@ def test_order_two_for_combined_slide_heave_and_pitch(name):
 def test_always_no_step_gains_energy(name, seed, count):
     """Friction gains no energy in coarse steps: ports that reverse within a step, rest or start apart, pieces that snap."""
     shear = reduce_to_shear_modes(crowned_contact(), count, 1.5e-7) if count else None
-    check_energy_of_random_march(name, seed, 60, shear)
+    faults = find_faults_of_random_march(name, seed, 60, shear)
+    assert max(faults.values()) <= 1, faults
 
 
 @pytest.mark.share(0)
@@ -140,7 +142,8 @@ def test_always_no_step_gains_energy(name, seed, count):
 def test_always_no_energy_is_created(laws, data, seed, steps):
     """No energy is created for random modes, initial states and drives, with coarse steps and
     lift-off."""
-    check_energy_of_random_march(data.draw(st.sampled_from(laws)), seed, steps)
+    faults = find_faults_of_random_march(data.draw(st.sampled_from(laws)), seed, steps)
+    assert max(faults.values()) <= 1, faults
 
 
 def test_exact_strip_slides_under_yaw():
@@ -189,9 +192,11 @@ def test_exact_separated_pieces_have_no_force():
 def test_always_energy_of_shear_modes_balances(name, seed, steps, count, depth):
     """The energy balances for random modes, initial states, drives and numbers of shear modes, with lift-off."""
     shear = reduce_to_shear_modes(crowned_contact(), count, depth)
-    check_energy_of_random_march(name, seed, steps, shear)
+    faults = find_faults_of_random_march(name, seed, steps, shear)
+    assert max(faults.values()) <= 1, faults
 
 
 def test_order_two_with_shear_modes():
     """With modes that combine slide, heave and pitch and a varying contact the march converges with order two."""
-    check_order_two("bonds", 800, 0.45, reduce_to_shear_modes(crowned_contact(), 8))
+    found = find_convergence("bonds", 800, reduce_to_shear_modes(crowned_contact(), 8))
+    assert found.order == pytest.approx(2, abs=0.45) and found.change <= 2e-3

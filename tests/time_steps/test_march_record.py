@@ -19,6 +19,7 @@ from patchfem.partial_slip.shear_modes import shear_modes
 from patchfem.structure import drive_sizes
 from patchfem.time_steps import March, laws, march
 from patchfem.time_steps import time_march as engine
+from patchfem.time_steps.contacts import Press
 
 from .test_march_loads import reduce_to_shear_modes
 
@@ -58,9 +59,7 @@ def make_pitching_contact(basis):
         sets.force,
         basis.slide,
         reduce_to_shear_modes(sets, 4),
-        sets=sets,
-        heave=basis.normal,
-        pitch=basis.pitch,
+        press=Press(sets, basis.normal, basis.pitch),
     )
 
 

@@ -163,7 +163,7 @@ def _describe_slip(joint: JointMode, curve: Curve) -> list[str]:
 def describe_band_width(backbone: Backbone) -> str:
     """Describe where the band of the damping ratio of a backbone is widest.
 
-    A second clause has the largest deviation of the frequency.
+    A second clause has the largest deviation of the frequency. A band that four digits do not show has no such place.
     """
     band = backbone.band
     curve = backbone.best
@@ -175,6 +175,12 @@ def describe_band_width(backbone: Backbone) -> str:
     k = int(np.argmax(deviations["damping"]))
     numbers = np.array([band.damping_low, band.damping_high, curve.damping])[:, k]
     low, high, best = (format_number(number, 4) for number in numbers.tolist())
+    if low == high:
+        largest = max(np.nanmax(one) for one in deviations.values())
+        return (
+            "The band of this curve holds the numerical error and, where both methods have a value, their difference: "
+            f"at most {100 * largest:.1g} % of frequency and damping ratio."
+        )
     return (
         "The band of this curve holds the numerical error and, where both methods have a value, their difference; it is "
         f"widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is {low} to {high} beside {best}, and "

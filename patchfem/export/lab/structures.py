@@ -64,7 +64,7 @@ def _describe_omissions(model: Model) -> str:
         "[wear]": model.wear is not None,
         "structure.travel": rig.springs.travel < MAX_COMPUTED_DISPLACEMENT,
         "the initial motion": rig.start is not None,
-        "the drive signal (Fex1 is for an amplitude of 1 N or 1 m/s^2)": rig.drive.kind != "free"
+        "the drive signal (Fex1 is for an amplitude of 1 N or 1 m/s^2)": not rig.drive.is_release
         and not isinstance(rig.drive.signal, SineDrive),
     }
     names = [name for name, is_missing in missing.items() if is_missing]
@@ -78,7 +78,7 @@ def make_matrices(rig) -> dict[str, np.ndarray | float]:
     """
     modes = rig.modes
     is_sine = isinstance(rig.drive.signal, SineDrive)
-    size = rig.drive.signal.acceleration if is_sine else float(rig.drive.kind != "free")
+    size = rig.drive.signal.acceleration if is_sine else float(not rig.drive.is_release)
     arrays = {
         "M": modes.mass * np.eye(modes.omega.size),
         "C": modes.mass * modes.damping_matrix,

@@ -104,7 +104,7 @@ def choose_bond_summation(model: Model, numerics):
             / structure.drive_sizes.find_drive_omega(drive.signal)
             / keys.bond_length
         )
-        if keys.reading != "report" and drive.kind != "free":
+        if keys.reading != "report" and not drive.is_release:
             holding = _find_holding_ratio(model, number)
             amplitude = min(amplitude, 1 / holding if holding >= MIN_STUCK_FORCE_RATIO else inf)
 
@@ -112,7 +112,7 @@ def choose_bond_summation(model: Model, numerics):
         ratio = 1.0
         if is_stuck_by_printed_law(model, number):
             ratio = STICKING_STROKE_RATIO
-        elif drive.kind == "free" or drive.waveform.is_step:
+        elif drive.is_release or drive.waveform.is_step:
             ratio = DECAYED_STROKE_RATIO
         stroke = max(4 * ratio * amplitude, MIN_STROKE)
         choices.append(
@@ -171,7 +171,7 @@ def is_stuck_by_printed_law(model: Model, number: int = 0) -> bool:
 
     The block then reverses in almost every step, and each reversal adds a strip to its list.
     """
-    if model.rig.drive.kind == "free" or model.friction is None:
+    if model.rig.drive.is_release or model.friction is None:
         return False
     keys = model.rig.friction.interfaces[number].numbers
     is_printed = law_has_trait(keys.law, "bonds") and keys.reading == "report"

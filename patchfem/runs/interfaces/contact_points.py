@@ -67,7 +67,7 @@ def make_contact(model: Model, numerics, patch) -> contacts.Contact:
     has_lower = any(j.patch is not None and j.patch.model.gap.side == "lower" for j in joints)
     soft_keys = [joint.keys for joint in joints if joint.is_soft]
     uses_elements = not (fields or has_lower or slide_apart) and all(map(has_elements, soft_keys))
-    moves = "sets" in fields
+    moves = "press" in fields
     sets = []
     for joint in joints:
         elements = joint.elements if uses_elements else None
@@ -130,13 +130,13 @@ def _find_load(model: Model, patch) -> dict:
     opening = patch.pressure.gap - compliance @ force
     modes = model.rig.modes
     still = np.zeros(modes.omega.size)
-    return {
-        "sets": contact_sets.ContactSets(compliance, patch.x, opening, force > 0),
-        "heave": still if modes.normal is None else np.asarray(modes.normal, float),
-        "pitch": still if modes.pitch is None else np.asarray(modes.pitch, float),
-        "preload": float(force.sum()),
-        "averages": averaged_law.make_averages(model.friction, patch),
-    }
+    press = contacts.Press(
+        contact_sets.ContactSets(compliance, patch.x, opening, force > 0),
+        still if modes.normal is None else np.asarray(modes.normal, float),
+        still if modes.pitch is None else np.asarray(modes.pitch, float),
+        averaged_law.make_averages(model.friction, patch),
+    )
+    return {"press": press, "preload": float(force.sum())}
 
 
 def make_points(joint: Joint, numerics, *, moves: bool = False) -> PointSet:

@@ -62,9 +62,16 @@ def find_bond_summation(model: Model, numerics: Numerics):
     """Return the EngineChoice by which time steps sum the bonds of a motion; None for other engines and laws."""
     if model.rig is None or numerics.engine != "march":
         return numerics.choice
-    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
-    has_bonds = any(law_has_trait(law, "bonds") for law in laws)
-    return bond_lists.choose_bond_summation(model, numerics) if has_bonds else None
+    if not _has_law_with(model, "bonds"):
+        return None
+    return bond_lists.choose_bond_summation(model, numerics)
+
+
+def _has_law_with(model: Model, trait: str) -> bool:
+    """Return whether the law of an interface of a bench or a rig has a trait, such as "cells"."""
+    if model.rig is None:
+        return law_has_trait(model.friction.law, trait)
+    return any(law_has_trait(one.numbers.law, trait) for one in model.rig.friction.interfaces)
 
 
 def list_space_runs(
@@ -125,11 +132,7 @@ def list_space_runs(
         add("modes", second_order_errors, {"shear_modes": fewer})
 
     # The cells of an Iwan model represent its continuous density to order 2.
-    laws = [model.friction]
-    if rig is not None:
-        laws = [interface.numbers for interface in rig.friction.interfaces]
-    has_cells = any(law_has_trait(law.law, "cells") for law in laws)
-    if engine.has_steps and solution.contact is not None and has_cells:
+    if engine.has_steps and solution.contact is not None and _has_law_with(model, "cells"):
         add("own", second_order_errors, {"has_half_cells": True})
 
     # Bonds: the bound of the sum, and if strips or the tail are coarse, the change of the motion with finer ones.

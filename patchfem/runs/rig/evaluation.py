@@ -292,7 +292,7 @@ class RunEvaluator:
         if self.has_friction:
             fields["reversal_rule"] = choose_reversal_force_rule(model)
             fields["ledger"] = run.response.extra.get("ledger")
-        if model.rig.drive.kind == "free":
+        if model.rig.drive.is_release:
             # The last whole cycle of a release may begin before the window.
             motion = (run.response.time, run.response.output, run.response.output_rate)
             fields["release"] = measure_last_cycle_amplitude(*motion, drive.period)

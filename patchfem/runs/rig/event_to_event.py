@@ -316,7 +316,7 @@ class LumpedEvaluator(RunEvaluator):
         }
         if not is_sinusoidal(drive):
             values |= dict.fromkeys(select_names("sine"))
-        if self.model.rig.drive.kind == "free":
+        if self.model.rig.drive.is_release:
             del values[AMPLITUDE]  # The engine knows that of the window; see its row in the table.
         window = run.window
         if not self.has_friction:
@@ -389,7 +389,7 @@ class LumpedEvaluator(RunEvaluator):
         rig = self.model.rig
         is_linear = not self.joints.laws
         springs = np.zeros(len(rig.modes.interfaces)) if is_linear else self.joints.springs
-        if rig.drive.kind != "free" or not np.isfinite(springs).all() or rig.springs.is_nonlinear:
+        if not rig.drive.is_release or not np.isfinite(springs).all() or rig.springs.is_nonlinear:
             return None
 
         # The part of the motion in which no interface slips.

@@ -136,7 +136,7 @@ def _collect_varying_load_fields(patch, solution) -> Arrays:
     The first frame is the initial state. The status is 0 for open, 1 for stick and 2 for slip.
     """
     # The first frame is the pressed patch at rest; the others are snapshots of the motion.
-    sets = solution.contact.sets
+    sets = solution.contact.press.sets
     weight = patch.pieces.interface.weight
     snapshots = solution.run.snapshots
     time = np.array([0.0, *(snapshot.time for snapshot in snapshots)])

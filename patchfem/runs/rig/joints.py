@@ -104,7 +104,7 @@ def make_joints(model: Model, numerics, patch) -> Joints:
             law = make_law(joint)
         else:
             law = grooves.make_grooves(joint.keys, find_climbed_grooves(model))
-        if joint.elements is not None and model.rig.drive.kind == "free":
+        if joint.elements is not None and model.rig.drive.is_release:
             # Decay curves are measured at the extremes of the output.
             law = masing.with_all_reversals(law)
         pairs.append((law, make_load(joint)))

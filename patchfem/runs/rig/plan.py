@@ -211,7 +211,7 @@ def describe_stick(rig, sizes: Values, chain: Chain) -> list[str]:
         the mode allows a stuck block to move.
     """
     ratio = sizes.get("D")
-    if ratio is None or not has_single_mode(rig) or rig.drive.kind == "free":
+    if ratio is None or not has_single_mode(rig) or rig.drive.is_release:
         return []
     stiffness = rig.first_mode.stiffness
     limit = MIN_HOLDING_LINK_STIFFNESS_RATIO * stiffness

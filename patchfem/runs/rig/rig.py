@@ -117,7 +117,7 @@ class Runner:
         self.stiffer = stiffer
         self.progress = progress
         self.is_single = is_single
-        self.is_release = model.rig is not None and model.rig.drive.kind == "free"
+        self.is_release = model.rig is not None and model.rig.drive.is_release
         self.solutions: dict[Numerics, Solution] = {}
         self._done = 0.0  # reported fraction of all runs
 
@@ -274,7 +274,7 @@ def run_motion(inputs: RunInputs) -> Result:
         measures = run.measures if run.has_errors else remove_errors(run.measures)
         return _make_result(replace(run, outcome=Outcome.DONE, measures=measures))
 
-    is_free = rig.drive.kind == "free"
+    is_free = rig.drive.is_release
     if rig.start is None and not is_free and not np.any(rig.modes.base):
         raise PatchfemError(
             "the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",

@@ -208,13 +208,13 @@ def describe_error(key: Key, error: ErrorDetails, value: TomlValue, path: str) -
     if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
         return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
     if error["type"] == "too_long":
-        most = error["ctx"]["max_length"]
+        max_length = error["ctx"]["max_length"]
         if not _is_open_array(key.types):
             return f"{needed}, not {len(value)} values"
         remedy = (
             "; give the modes of a larger rig in structure.file" if key.table is Structure else ""
         )
-        return f"{len(value)} values are too many; at most {most} are possible{remedy}"
+        return f"{len(value)} values are too many; at most {max_length} are possible{remedy}"
     if error["type"] == "missing" and isinstance(value, list) and value:
         return f"{needed}, not {len(value)} value{'s' if len(value) > 1 else ''}"
 

@@ -139,9 +139,9 @@ def _use_all_points(aligned: Aligned, first: Raster, second: Raster, digit: floa
         return aligned
     shift = fit.state[: model.n_axes]
     place = aligned.place._replace(shift=shift, turn=float(fit.state[model.n_axes]))
-    whole = _make_model(first, second, place, stride=1)
-    whole.max_gain_change = model.max_gain_change
-    return replace(aligned, model=whole, fit=evaluate(whole, fit.state, fit.free, digit))
+    full_model = _make_model(first, second, place, stride=1)
+    full_model.max_gain_change = model.max_gain_change
+    return replace(aligned, model=full_model, fit=evaluate(full_model, fit.state, fit.free, digit))
 
 
 def _is_same_place(aligned: Aligned) -> bool:

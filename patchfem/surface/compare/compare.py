@@ -100,6 +100,7 @@ class Options(NamedTuple):
     - shift: known x of the second trace minus x of the first [m].
     - datum: "straight" if that of the instrument is known to be, so that no bow is subtracted.
     - keep_spikes: whether spikes, dropouts and dust are kept as heights.
+    - cutoff: that of the roughness inside and outside of a track of traces [m]; None for the longest standard one that fits.
     """
 
     units: tuple[str, str] | None = None
@@ -107,6 +108,7 @@ class Options(NamedTuple):
     shift: float | None = None
     datum: str = ""
     keep_spikes: bool = False
+    cutoff: float | None = None
 
 
 # Options of a comparison for which the user gives none
@@ -164,7 +166,7 @@ def compare_surfaces(
         # The second surface is placed on the first, the depths at their common points are measured, and the waves of
         # both are compared
         aligned = align(first, second, options.shift, is_straight=bool(options.datum))
-        result = _measure(surfaces, (first, second), aligned)
+        result = _measure(surfaces, (first, second), aligned, options.cutoff)
         ratios = _compare_waves(result, options.direction)
         result = replace(result, values=result.values | ratios)
 
@@ -181,9 +183,9 @@ def _check_options(surfaces: tuple[Profile | Areal, Profile | Areal], options: O
     n_scans = sum(isinstance(surface, Areal) for surface in surfaces)
     if n_scans == 1:
         raise PatchfemError("compare: two traces are needed, or two areal scans")
-    if n_scans and (options.shift is not None or options.datum):
+    if n_scans and (options.shift is not None or options.datum or options.cutoff is not None):
         raise PatchfemError(
-            "compare: a shift and a datum can be given only for traces; those of scans are found"
+            "compare: a shift, a datum and a cut-off can be given only for traces; the first two of scans are found"
         )
     if options.datum not in ("", "straight") or options.direction not in ("", "x", "y"):
         raise PatchfemError(
@@ -201,6 +203,7 @@ def _measure(
     surfaces: tuple[Profile | Areal, Profile | Areal],
     rasters: tuple[Raster, Raster],
     aligned: Aligned,
+    cutoff: float | None = None,
 ) -> Comparison:
     """Measure the depth at a common place, or below the flanks of the second trace, or say why there is none.
 
@@ -212,6 +215,8 @@ def _measure(
         The same on even steps and without spikes.
     aligned : Aligned
         Common place of both, or the reason why there is none.
+    cutoff : float, optional
+        Cut-off [m] of the roughness of traces.
 
     Returns
     -------
@@ -256,8 +261,8 @@ def _measure(
     tracks = ()
     if code.startswith("worn"):
         # The area of a single track is that of the common part.
-        whole = loss[:3] if len(spans) == 1 else None
-        tracks = tuple(measure_track(depths, span, whole) for span in spans)
+        common_loss = loss[:3] if len(spans) == 1 else None
+        tracks = tuple(measure_track(depths, span, common_loss) for span in spans)
     if tracks and not _is_clear_track(tracks[0], depths, is_placed=is_placed):
         is_beyond_drift = is_placed and area > HALF_WIDTH_95 * error
         unworn_code = "no_wear" if is_placed else "elsewhere"
@@ -272,7 +277,7 @@ def _measure(
     values[names.region] = name_quantity(names.region, depths.size, None, None)
     values[names.grown] = name_estimate(names.grown, grown, grown_error, 0.0)
     regions = {}
-    cutoff = None
+    own_cutoff = None
     if code.startswith("worn"):
         means = [bound / depths.size for bound in loss[:3]]
         values[names.lost] = loss
@@ -283,13 +288,13 @@ def _measure(
         else:
             values["worn_share"] = _measure_share(depths)
         if is_trace and is_placed:
-            regions, cutoff = waves.measure_roughness(depths, spans)
+            regions, own_cutoff = waves.measure_roughness(depths, spans, cutoff)
     limit = _find_detection_limit(depths) if is_placed else None
     # A track over a third of the common part may be as deep as the limit without being found.
     at_most = max(highest / depths.size, (limit or 0.0) / 3)
     numbers = {"lost": area, "grown": grown, "basis": placement.basis, "at_most": at_most}
     verdict = Finding(code, numbers | {"detection_limit": limit} | possible)
-    evidence = Evidence(placement, depths, regions, cutoff)
+    evidence = Evidence(placement, depths, regions, own_cutoff)
     findings = _collect_findings(evidence, bend, tracks)
     return Comparison(*surfaces, verdict, values, tracks, findings, evidence)
 

@@ -121,11 +121,11 @@ def _make_images(surface: Raster, pixel: float) -> tuple[np.ndarray, ...]:
         z, pixel / surface.steps, output_shape=tuple(shape), order=1, mode="nearest"
     )
     z = remove_long_waves(z, SIDE_OVER_IMAGE_GAUSSIAN[z.ndim])
-    whole = np.clip(z, -3 * z.std(), 3 * z.std())
-    valleys = np.minimum(whole, np.median(z))
+    clipped = np.clip(z, -3 * z.std(), 3 * z.std())
+    valleys = np.minimum(clipped, np.median(z))
     valleys = valleys - valleys.mean()
     images = (valleys, _whiten(valleys))
-    return images[1:] if z.ndim > 1 else (whole - whole.mean(), *images)
+    return images[1:] if z.ndim > 1 else (clipped - clipped.mean(), *images)
 
 
 def _whiten(z) -> np.ndarray:

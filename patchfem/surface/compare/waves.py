@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
+from ...core import PatchfemError
+from ...formatting import format_length
 from ..profile import find_runs
 from ..quantity import Quantity
 from ..roughness.filter import mean_surface
@@ -135,7 +137,9 @@ def _divide_means(before, after, power: float) -> np.ndarray:
     return (second / first) ** power * np.exp([0.0, -width, width])
 
 
-def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[dict, float | None]:
+def measure_roughness(
+    depths: DepthMap, spans: list[tuple[int, int]], cutoff: float | None = None
+) -> tuple[dict, float | None]:
     """Measure Ra, Rq and slope inside of the longest track and outside of all tracks, before and after wear.
 
     As in ISO 21920-2, they are those of the whole roughness profile about its mean line. The form of a part is
@@ -148,6 +152,8 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
         Of traces.
     spans : list
         First and last sample of each track, the longest one first.
+    cutoff : float, optional
+        Cut-off [m]; by default the longest standard one that fits both regions.
 
     Returns
     -------
@@ -155,6 +161,11 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
         {"inside", "outside": {"before", "after", "ratio": {name: Quantity}}}; {} if a region is too short.
     cutoff : float or None
         Cut-off [m] that fits both regions.
+
+    Raises
+    ------
+    PatchfemError
+        If the given cut-off does not fit them.
     """
     # Half a flank belongs neither to the track nor to what is beside it.
     step = depths.cell
@@ -166,7 +177,16 @@ def measure_roughness(depths: DepthMap, spans: list[tuple[int, int]]) -> tuple[d
     inside = [(spans[0][0] + flank, spans[0][1] - flank)]
     parts = {"inside": inside, "outside": find_runs(outside)}
     lengths = [max((last - first for first, last in runs), default=0) for runs in parts.values()]
-    cutoff = fitting_cutoff(min(lengths) * step, step)
+    fitting = fitting_cutoff(min(lengths) * step, step)
+    if cutoff is not None and not 4 * step <= cutoff <= (fitting or 0.0):
+        longest = (
+            f"the longest standard one is {format_length(fitting)}" if fitting else "none fits"
+        )
+        raise PatchfemError(
+            f"compare: the cut-off {format_length(cutoff)} does not fit six times into the track and into what is beside "
+            f"it, or is shorter than four steps; {longest}"
+        )
+    cutoff = cutoff or fitting
     if cutoff is None:
         return {}, None
 

@@ -118,19 +118,19 @@ def make_report(
     """
     part = surface if window is None else crop(surface, *window)
     is_scan = isinstance(part, Areal)
-    whole = part if is_scan else resample_evenly(part)
+    even = part if is_scan else resample_evenly(part)
     # An uneven trace has more samples afterwards, and one without heights at its ends fewer.
-    count = min(part.x.size, whole.x.size)
+    count = min(part.x.size, even.x.size)
     if count < MIN_TRACE_SAMPLES and not is_scan:
         raise PatchfemError(
             f"{part.source}: {count} samples; the parameters need at least {MIN_TRACE_SAMPLES}"
         )
-    primary, form_name = subtract_form(whole, form)
+    primary, form_name = subtract_form(even, form)
     if short is not None:
         # The filter changes the plane or line, so the form is subtracted again after it.
         primary = subtract_form(filter_surface(primary, short)[0], form)[0]
     # A straight line has heights of round-off, of which parameters would be made.
-    if np.nanmax(np.abs(primary.z)) <= HEIGHT_ROUND_OFF * np.nanmax(np.abs(whole.z)):
+    if np.nanmax(np.abs(primary.z)) <= HEIGHT_ROUND_OFF * np.nanmax(np.abs(even.z)):
         primary = replace(primary, z=frozen_array(primary.z * 0.0))
 
     # Without a cut-off, the primary profile or the levelled scan is evaluated.
@@ -144,11 +144,11 @@ def make_report(
         quantities, notes = _measure_trace(parts, cutoff)
 
     return RoughnessReport(
-        source=whole.source,
-        sampling=Sampling(float(np.ptp(whole.x)), measure_step(whole.x), whole.z.shape),
+        source=even.source,
+        sampling=Sampling(float(np.ptp(even.x)), measure_step(even.x), even.z.shape),
         treatment=Treatment(form_name, short, cutoff, window),
         values=tuple(quantities),
-        notes=whole.notes + _describe_spikes(part) + notes,
+        notes=even.notes + _describe_spikes(part) + notes,
         surface=parts,
         heights=evaluated.z[~evaluated.missing],
     )

@@ -402,6 +402,22 @@ def test_exact_roughness_in_a_bent_track_is_that_of_the_unworn_surface(shape):
         assert region["ratio"]["slope"][:3] == (None,) * 3
 
 
+def test_exact_cutoff_of_the_roughness_may_be_given():
+    """A cut-off of 25 um gives the Ra of sections of 25 um, which is smaller; one that does not fit is refused."""
+    before, after = make_pair(make_cosine(20 * UM, 1500, 2500), 7, noise=0.2 * NM)
+    longest, own = (
+        compare_surfaces(before, after, Options(cutoff=cutoff)).evidence
+        for cutoff in (None, 25 * UM)
+    )
+    assert (longest.cutoff, own.cutoff) == (pytest.approx(80 * UM), 25 * UM)
+    for region in ("inside", "outside"):
+        sizes = [one.roughness[region]["before"]["Ra"].value for one in (own, longest)]
+        assert sizes[0] < 0.9 * sizes[1]
+    for cutoff in (250 * UM, 2 * UM):
+        with pytest.raises(PatchfemError, match="the longest standard one is 80 um"):
+            compare_surfaces(before, after, Options(cutoff=cutoff))
+
+
 def test_refuses_short_traces():
     """Traces of too few heights are refused."""
     short = [Profile(trace.x[:20], trace.z[:20], trace.source) for trace in (NEW, WORN)]

@@ -245,3 +245,17 @@ def test_exact_cutoff_splits_trace_between_gap_and_asperities(tmp_path):
     ).fine
     # without the cut-off the long waves would count twice
     assert moments_of_all.height > 4 * skin.rms_height
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.25, 2.0**10])
+def test_always_note_on_skewness_has_no_unit(unit):
+    """Tops that were cut off are noted as such in any unit of length, and the mirrored surface has single high peaks."""
+    heights = gaussian_filter1d(np.random.default_rng(20300113).normal(size=20_000), 4.0)
+    worn = np.minimum(heights, 0.0) * unit
+    note, scaled, mirrored = (
+        trace_moments(make_trace(z, step)).not_gaussian
+        for z, step in ((worn / unit, 1.0), (worn, unit), (-worn, unit))
+    )
+    assert "tops that were cut off by wear" in note and "skewness -" in note
+    assert scaled == note
+    assert "single high peaks" in mirrored
