@@ -193,7 +193,7 @@ def present(answer: "Answer", output: Output) -> None:
         print(*show.list_files(output.out, not output.no_page), sep="\n", flush=True)
     # the results are in place and named if the picture cannot be written
     if output.plot is not None:
-        axes.write_plot(answer, output.plot)
+        axes.write_plot({"": answer}, output.plot)
 
 
 def refuse_existing(out: Path | None) -> None:

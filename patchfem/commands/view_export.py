@@ -6,9 +6,11 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..export import convert, page
+from ..export.charts import axes
 from ..export.lab import structures
 from ..model import model
 from .shared import (
+    Plot,
     Sets,
     UsageError,
     flag_option,
@@ -83,9 +85,14 @@ def report(
     out: out_option(
         "page to write; default: report.html in the folder, or in the current folder for several"
     ) = None,
+    plot: Plot = None,
 ):
     """Make the page of a results folder again from its files, or show several folders of the same kind side by side.
 
     Example: patchfem report out/rig out/six -o both.html
     """
+    if plot is not None:
+        axes.find_picture_format(plot)
     print(page.write_report(*folders, out=out))
+    if plot is not None:
+        axes.write_plot(page.read_answers(folders), plot)

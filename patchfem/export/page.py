@@ -65,7 +65,7 @@ def make_page(folders: list[Path]) -> str:
 
     PatchfemError if a folder has no complete result, or if the answers are of different kinds.
     """
-    answers = _read_all(folders)
+    answers = read_answers(folders)
     first = next(iter(answers.values()))
     drawn = panels.make_panels(answers, CHARTS[first.kind])
     # a single answer has tables, files and films; of several answers the page shows what differs
@@ -101,7 +101,7 @@ def make_page(folders: list[Path]) -> str:
     )
 
 
-def _read_all(folders: list[Path]) -> Answers:
+def read_answers(folders: list[Path]) -> Answers:
     """Return the answers in folders by their names in legends, such as "load 4 kN"; "" for a single answer."""
     if not folders:
         raise PatchfemError("report: at least one results folder is needed")

@@ -26,7 +26,10 @@ def folders(tmp_path_factory):
 def test_exact_two_runs_share_charts_and_measures(folders):
     """The page of two runs has a curve and a column of measures for each; the forces are 0.2 and 0.4 of the load."""
     page = folders / "both.html"
-    run_successfully("report", folders / "low", folders / "high", "-o", page)
+    run_successfully(
+        "report", folders / "low", folders / "high", "-o", page, "--plot", page.with_suffix(".png")
+    )
+    assert page.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
     text = page.read_text("utf-8")
     curves = read_charts(text)["Friction loop"]["data"]
     names = {curve["name"]: curve for curve in curves}

@@ -156,5 +156,5 @@ def test_exact_plot_is_a_picture(folders, tmp_path, ending, names):
     starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
     for name in names:
         path = tmp_path / f"{name}.{ending}"
-        axes.write_plot(store.read_answer(folders / name), path)
+        axes.write_plot({"": store.read_answer(folders / name)}, path)
         assert path.read_bytes().startswith(starts[ending])

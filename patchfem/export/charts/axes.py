@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
-from ..answer import Answer
+from ..answer import Answer, Answers
 from ..rows import CHARTS
 from .panel import Axis, Panel, find_unit_factor, use_units
 from .panels import make_panels
@@ -201,10 +201,10 @@ def find_picture_format(path: Path) -> str:
     return path.suffix.lower()[1:]
 
 
-def write_plot(answer: Answer, path: Path) -> None:
-    """Write the main chart of an answer, and of a backbone all three charts, as .png, .svg or .pdf.
+def write_plot(answers: Answers, path: Path) -> None:
+    """Write the main chart of one or several answers, and of a backbone all three charts, as .png, .svg or .pdf.
 
-    It is the first chart of the page, and of a sweep the measure that the answer names first.
+    It is the first chart of the page, and of a sweep the measure that the answer names first. Several `answers` have names.
 
     Raises
     ------
@@ -214,13 +214,14 @@ def write_plot(answer: Answer, path: Path) -> None:
         If the file cannot be written.
     """
     ending = find_picture_format(path)
-    panels = make_panels({"": answer}, CHARTS[answer.kind])
+    kind = next(iter(answers.values())).kind
+    panels = make_panels(answers, CHARTS[kind])
     if not panels:
         raise PatchfemError(f"{path}: this answer has no chart")
     # of a sweep, one measure in its unit comes before the ratios of all of them
     panels.sort(key=lambda panel: panel.style == "relative")
     with write_atomically(path) as partial:
-        figure = make_figure(panels[: N_PICTURE_CHARTS.get(answer.kind, 1)])
+        figure = make_figure(panels[: N_PICTURE_CHARTS.get(kind, 1)])
         save_figure(figure, partial, ending)
 
 
