@@ -81,7 +81,7 @@ def picture(table: dict, path: Path = FOLDER / "work_precision.svg") -> Path:
                         color=colour,
                         ms=9 if mark == "*" else 4,
                         lw=1,
-                        label=name,
+                        label=name.replace("_", "-"),
                     )
             axis.set(title=TITLES[where], xlabel="CPU time [ms]", ylim=(FLOOR / 3, 10))
         axes[0].set_ylabel("largest error of the slide, last 5 cycles")
