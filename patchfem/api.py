@@ -57,7 +57,7 @@ from .model.model import Model, build_without_sweep
 from .model.model import build as build_model
 from .runs.batch import batches
 from .runs.patch import result as patch_result
-from .runs.plan import Plan
+from .runs.plan import Plan, plan_first_case
 from .runs.plan import plan as plan_model
 from .runs.results import result as run_result
 from .runs.run import run as run_plan
@@ -298,9 +298,9 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     >>> plan.kind, plan.unknowns["modes"]
     ('rig', 1)
     """
-    if isinstance(scene, Model):
-        return plan_model(build(scene, **sets))
-    return plan_model(load(scene, **sets))
+    return plan_first_case(
+        build(scene, **sets) if isinstance(scene, Model) else load(scene, **sets)
+    )
 
 
 @_make_verb
@@ -346,7 +346,7 @@ def run(
     """
     if isinstance(scene, Plan):
         _reject_keys(sets, "Plan")
-    scene_plan = scene if isinstance(scene, Plan) else plan(scene, **sets)
+    scene_plan = scene if isinstance(scene, Plan) else plan_model(build(scene, **sets))
     result = run_plan(scene_plan, _print_to_stderr if say is None else say, progress)
     # the public class adds plots and tables to the result, and attribute access to its measures
     values = {field.name: getattr(result, field.name) for field in fields(result)}

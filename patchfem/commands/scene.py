@@ -83,7 +83,7 @@ def plan(
     Example: patchfem plan rig.toml --set contact.tilt.angle="1 mrad"
     """
     loaded_scene = load_scene(scene, set_)
-    run_plan = plans.plan(loaded_scene)
+    run_plan = plans.plan_first_case(loaded_scene)
     plan_data = run_plan.as_json()
     if probe:
         from ..runs.probe import run_probe

@@ -133,7 +133,7 @@ class Plan:
 
 
 def plan(source) -> Plan:
-    """Plan the run of a Scene or a Model, or the first case of a Scene with a table [sweep].
+    """Plan the run of a Scene or a Model.
 
     Parameters
     ----------
@@ -143,13 +143,21 @@ def plan(source) -> Plan:
     Raises
     ------
     PatchfemError
-        If the scene cannot be run, with the position of the error in the scene.
+        If the scene cannot be run, with the position of the error in the scene, or if it has a [sweep] and so means many
+        models.
     """
-    if isinstance(source, Model):
-        with locate_errors(source.source):
-            return _make_plan(source)
-    if not source.sweep:
-        return plan(build(source))
+    model = source if isinstance(source, Model) else build(source)
+    with locate_errors(model.source):
+        return _make_plan(model)
+
+
+def plan_first_case(source) -> Plan:
+    """Plan the run of a Scene or a Model; of a Scene with a table [sweep] plan the first case, and say so.
+
+    Parameters and errors are those of `plan`, but a [sweep] is allowed. The result is to be shown, not to be run.
+    """
+    if isinstance(source, Model) or not source.sweep:
+        return plan(source)
 
     # A key that only [sweep] names has its first value in each scene of the file; others get theirs.
     first = [f"{axis.key}={axis.texts[0]}" for axis in source.sweep]

@@ -35,6 +35,7 @@ none.
 
 import numpy as np
 
+from ..friction.bonds.strip_rows_kernels import ListLaw
 from ..kernel_cache.flags_kernels import NJIT_CALL
 from ..kernel_cache.jit import njit
 from . import flanks_kernels as flanks
@@ -62,7 +63,7 @@ from .motion_kernels import (
     store_base,
     subtract_step,
 )
-from .step_rows_kernels import VECTOR, WIDTH, Law, Step, Value
+from .step_rows_kernels import VECTOR, WIDTH, Law, ListRow, Step, Value
 
 MAX_NEWTON_ITERATIONS = 60  # Newton iterations of a step
 MAX_LOAD_ITERATIONS = (
@@ -183,10 +184,10 @@ def weigh_block(points, block, damping, step):
         return
 
     # Behind pieces it is the path mean over the part that slides, and the mean of both ends over the part of the pieces.
-    # Lists act on pieces by their path means, over both parts.
-    is_list = points.blocks.law[block] == Law.LIST
+    # Lists whose force jumps act on pieces by their path means, over both parts.
+    by_means = balances_by_means(points, block)
     for j in range(n_lanes):
-        if is_list:
+        if by_means:
             values[Value.FORCE + j] = values[Value.MEAN + j]
             values[Value.BY_SLIDE + j] = values[Value.MEAN_BY_SLIDE + j]
             values[Value.BY_SHEAR + j] = -values[Value.MEAN_BY_SLIDE + j]
@@ -380,8 +381,21 @@ def write_residual(system, level):
 
 @njit(**NJIT_CALL)
 def find_shear_weight(points, k):
-    """Return the part of a step at whose end shear coordinate k is in equilibrium: 1, or 1/2 for lists."""
-    return 0.5 if points.blocks.law[points.pieces.bent[k, 0]] == Law.LIST else 1.0
+    """Return the part of a step at whose end shear coordinate k is in equilibrium: 1, or 1/2 for lists whose force jumps."""
+    return 0.5 if balances_by_means(points, points.pieces.bent[k, 0]) else 1.0
+
+
+@njit(**NJIT_CALL)
+def balances_by_means(points, block):
+    """Return whether pieces take the path means of a block: a list whose force jumps, with reading "report" or of order 0.
+
+    The end of a step has no equilibrium at a jump. A force that is continuous is balanced at the end: with path means, the
+    slide behind pieces that are softer than the bonds alternates from step to step.
+    """
+    if points.blocks.law[block] != Law.LIST:
+        return False
+    law = points.lists.law[int(points.numbers[block, ListRow.INDEX])]
+    return law[ListLaw.IS_STRETCH] * law[ListLaw.ORDER] == 0.0
 
 
 @njit(**NJIT_CALL)
@@ -691,6 +705,7 @@ def drop_negative_slopes(system):
                 values[Value.BY_SLIDE + j] = slope
                 if points.blocks.law[block] == Law.LIST:
                     values[Value.MEAN_BY_SLIDE + j] = slope
+                    values[Value.END_BY_SLIDE + j] = max(values[Value.END_BY_SLIDE + j], 0.0)
                     values[Value.BY_SHEAR + j] = -slope
             moves[Port.BY_SLIDE, p] += sum_points(points, block, Value.BY_SLIDE)
 

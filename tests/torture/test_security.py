@@ -34,8 +34,8 @@ WORDS = re.compile(
 )
 # uses that were reviewed; `shell` is the name of the shell whose completions are written
 HARMLESS = {
-    ("compiled", "compile()"),
-    ("compiled", "exec()"),  # a loop of the package in which its friction law is inserted
+    ("kernel_cache", "compile()"),
+    ("kernel_cache", "exec()"),  # a loop of the package in which its friction law is inserted
     ("__main__", "shell=shell"),
 }
 FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); json.load(f)"
