@@ -298,7 +298,10 @@ def make_page(found: dict[str, list[Row]], folder: Path) -> str:
 
 
 def main(only: str = "", path: Path | None = FOLDER / "reproduced.md") -> dict[str, list[Row]]:
-    """Compute all parts, or one; print the rows, write the page if a path is given, and return the rows."""
+    """Compute all parts, or one; print the rows, write the page if a path is given, and return the rows.
+
+    The page of one part has its name (`table-1.md`), so that it does not replace the page of all.
+    """
     parts = list_parts(None if path is None else path.parent)
     if only and only not in parts:
         raise PatchfemError(f"--only {only}: the parts are {', '.join(parts)}")
@@ -312,6 +315,7 @@ def main(only: str = "", path: Path | None = FOLDER / "reproduced.md") -> dict[s
                 print(f"{row.what}: {row.printed}, computed {row.computed}", file=sys.stderr)
         print("\n".join(format_rows(found[name])), flush=True)
     if path is not None:
+        path = path.with_name(f"{only}.md") if only else path
         path.write_text(make_page(found, path.parent), "utf-8")
     return found
 
