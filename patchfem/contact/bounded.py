@@ -340,7 +340,7 @@ class _Holder:
         return shifted
 
     def _shift(self, traction, motion, is_movable) -> _State | None:
-        """Return shifted tractions and motions (see `project`), or None if they miss the resultants."""
+        """Return shifted tractions and motions (see `project`), or None if no shift gives the required resultants."""
         movable = np.flatnonzero(is_movable)
         rigid = self.rigid[:, movable]
         lower = self.lower.flat[movable]

@@ -162,7 +162,7 @@ def format_csv(lists: Lists) -> str:
 
 
 def make_tables(answer: Answer) -> list[Table]:
-    """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
+    """Return the tables of an answer with `title`, `headings` and `rows` of strings, without tables that have no rows."""
     tables = []
     for table in TABLES.get(answer.kind, ()):
         rows = list_rows(answer, table.source)

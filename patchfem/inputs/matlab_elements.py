@@ -107,7 +107,7 @@ def _list_variables(data: bytes) -> Iterator[Element]:
 def _list_elements(
     data: bytes, order: str, place: int, stop: int, unit: int = 8
 ) -> Iterator[Element]:
-    """Iterate over the elements between two places of a content, in the order "little" or "big" of its bytes.
+    """Iterate over the data elements between two byte offsets of a file; `order` is its byte order, "little" or "big".
 
     Inside a variable they begin at multiples of eight bytes, the `unit`.
     """

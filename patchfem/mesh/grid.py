@@ -255,7 +255,7 @@ def make_graded_grid(
 
 
 def compute_row_scale(n_columns: int) -> float:
-    """Return the factor by which the rows of a grid with equal columns are shorter than with N_REFERENCE_COLUMNS columns.
+    """Return the height of the rows of a grid with equal columns, divided by that with N_REFERENCE_COLUMNS columns.
 
     It is at most 1: with fewer columns the rows stay as short.
     """

@@ -179,7 +179,7 @@ def _check_structure(path: Path, tables) -> None:
 
 
 def _check_wear_start(path: Path, tables) -> tuple[str]:
-    """Check that the result.nc file `path` of an earlier run has the pieces of the scene, and return a note on its depth."""
+    """Check that the earlier run in the file `path` has the pieces of the scene; return a note on its worn depth."""
     return (wear.read_earlier_wear(path, tables).sentence,)
 
 

@@ -169,7 +169,7 @@ class PlainNumbers:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys of the numbers as they were given."""
+        """Keys whose values are numbers, as the user wrote them."""
         return tuple(limit.key for limit in self.limits.values())
 
     def are_plain(self, values: np.ndarray) -> np.ndarray:

@@ -78,7 +78,7 @@ def _describe_key(key: Key, raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def _describe_selection(model: type[Table], key: str) -> str:
-    """Return which keys each value of a selector needs, or which values need a key, or "".
+    """Describe the keys that a value of a selector requires, or the values that require a key; "" if there are none.
 
     A selector is a key, such as `law`, whose value decides which others the table needs. `model` is the class of the
     table.

@@ -156,7 +156,7 @@ class CurveComparison(Comparison):
         return not is_reference
 
     def estimate_deviation(self, computed: np.ndarray, training: np.ndarray) -> np.ndarray:
-        """Return the standard deviations (2k,) of the values, assumed ones from the scatter around a computed curve.
+        """Return the standard deviations (2k,) of the values; missing ones follow from the scatter about a computed curve.
 
         The fitted values take up as many degrees of freedom, half of them of each quantity.
         """

@@ -48,7 +48,7 @@ class Comparison(ABC):
     Attributes
     ----------
     keys : FreeKeys
-        Free keys of the scene.
+        Keys of the scene that the fit varies.
     path : Path
         File of the measurement.
     measured : (r,) array

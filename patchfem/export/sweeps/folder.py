@@ -258,7 +258,7 @@ class Writer:
             raise fault
 
     def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
-        """Write the summary files of the cases that need one, then one file (chunk) with the measures of all these cases.
+        """Write the summary files of the cases that have none yet, then a chunk file with the measures of all cases given.
 
         Parameters
         ----------

@@ -36,7 +36,7 @@ def check_structure(draft: SceneDraft) -> None:
 
 
 def _check_file(structure: TableFacts) -> None:
-    """Report a structure.file that cannot be read by its extension, and keys that do not fit to it."""
+    """Report a structure.file whose extension is not supported, and keys that do not apply to such a file."""
     extension = Path(structure.file).suffix.lower()
     if extension not in (*ARRAY_EXTENSIONS, *UNIVERSAL_EXTENSIONS):
         advice = advise_on_name(extension, (*ARRAY_EXTENSIONS, ".uff"))

@@ -337,7 +337,7 @@ def _make_placement(aligned: Aligned) -> Placement:
 def _collect_findings(
     evidence: Evidence, bend: float, tracks: tuple[Track, ...]
 ) -> tuple[Finding, ...]:
-    """Return what a reader must know of a comparison: findings on position, datum, gain of the instrument and tracks.
+    """Return the findings on position, datum, gain of the instrument and tracks that a reader of a comparison needs.
 
     `evidence` has the aligned depths and how they were placed, and `bend` [m] is the height of the subtracted parabola.
     """
