@@ -113,8 +113,8 @@ def test_exact_guide_numbers_of_damper_are_reproduced(tmp_path, monkeypatch):
             answers.append(run_successfully(*shlex.split(line)[1:]).out)
     measures = read_json("out/curve/summary.json")["measures"]
     peak = measures["relative_displacement_amplitude"]["value"]
-    assert f"here {1e6 * peak:.1f} um" in text
-    assert f"here {measures['peak_frequency']['value']:.2f} Hz" in text
+    frequency = measures["peak_frequency"]["value"]
+    assert f"here {1e6 * peak:.1f} um at {frequency:.2f} Hz" in text
     quotes = re.findall(r"(?:^> .*\n)+", page, re.M)
     assert len(quotes) == 2
     for quote in quotes:
