@@ -26,7 +26,7 @@ from .rows import CHARTS, FILE_DESCRIPTIONS
 
 # value in a scene file
 TomlValue = str | float | list[Any] | dict[str, Any]
-FIGURE_COMPRESSION_LEVEL = 6  # of zlib, from 1 (fast) to 9 (small)
+FIGURE_COMPRESSION_LEVEL = 6  # level of zlib, from 1 (fast) to 9 (small)
 
 
 def write_report(*folders: Path, out: Path | None = None) -> Path:

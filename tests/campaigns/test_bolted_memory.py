@@ -91,8 +91,8 @@ def test_always_below_the_memory_limit(number, tmp_path):
     path = tmp_path / "joint.toml"
     path.write_text(make_joint(number), "utf-8")
     program = "import sys, resource\nfrom patchfem.__main__ import main\n"
-    program += "sys.argv = ['patchfem', 'run', sys.argv[1], '-o', sys.argv[2]]\n"
-    program += "try:\n    main()\nfinally:\n    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+    program += "try:\n    main(['run', sys.argv[1], '-o', sys.argv[2]])\n"
+    program += "finally:\n    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
     command = [sys.executable, "-c", program, str(path), str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert 1024 * int(done.stdout.split()[-1]) <= MAX_BYTES
