@@ -8,7 +8,7 @@ from scene_texts import PIECE
 
 from patchfem import run
 from patchfem.core import Outcome
-from patchfem.runs.patch import mesh_levels
+from patchfem.runs.patch import grids
 from patchfem.scene import loads
 
 SIZE, WIDTH, LOAD = 12.7e-3, 12.7e-3, 115.653761996773
@@ -79,10 +79,8 @@ def assert_errors_cover_hertz(result, load) -> tuple:
 @pytest.fixture
 def coarse_meshes(monkeypatch):
     """Limit automatic meshes to 1/36 of the usual cost."""
-    predict = mesh_levels.predict_condensing_seconds
-    monkeypatch.setattr(
-        mesh_levels, "predict_condensing_seconds", lambda meshes: 36 * predict(meshes)
-    )
+    predict = grids.predict_condensing_seconds
+    monkeypatch.setattr(grids, "predict_condensing_seconds", lambda meshes: 36 * predict(meshes))
 
 
 @pytest.mark.share(0)

@@ -1,46 +1,57 @@
-"""Static measures of many cases of a patch, on meshes that the cases share.
+"""Solution of the cases of a patch on nested meshes, from which their errors are estimated.
 
-In: a `PatchModel` whose loading and gap shapes may contain arrays, and a tolerance. Out: a `Batch`. The cases are pressed
-together on nested meshes. Those that miss the tolerance go on with the next mesh. When this would be too expensive, they
-get meshes that are graded to their own contacts; many of them are divided by the ends of their contacts before. A case
-that is alone ends with its tolerance or with the limit of the mesh of a single run.
+In: a `PatchModel` whose loading and gap shapes may contain arrays, and a tolerance. Out: a `Batch`; or, of a single patch,
+its `Patch` on each mesh. The cases are pressed together on nested meshes, and those that miss the tolerance go on with the
+next mesh. When this would be too expensive, they get meshes that are graded to their own contacts; many of them are divided
+by the ends of their contacts before. A case that is alone ends with its tolerance or with the limit of its mesh.
 """
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from time import process_time
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...core import PatchfemError
 from ...mesh.grading import Layout
 from ..refine import NO_LIMIT, refine
-from . import grids, mesh_levels
-from .cases import Batch, CaseMeasures, Cases, MeshFact, make_cases, take_patch
-from .condensed import CondensedPair, condense
+from . import grids, profile_points
+from .cases import Batch, CaseMeasures, MeshFact, make_cases, take_patch
+from .condensed import condense
+from .contact_search import (
+    MAX_GRADED_CONTACTS,
+    ContactPlaces,
+    ContactSearch,
+    SolvedContact,
+    find_contact_extent,
+    find_contact_places,
+    join_places,
+)
 from .measures import (
     MIN_CONTACT_EDGE_ERROR_IN_CELLS,
     MeshValues,
+    StaticEstimates,
+    add_measures,
     collect_mesh_values,
     estimate_static_measures,
+    max_mesh_error_ratio,
+    with_static_measures,
 )
-from .press import Level, PressedCases, make_level, press_on_level
-from .values import contact_reaches_steep_end, find_contact_edges
+from .press import (
+    Level,
+    Patch,
+    Patches,
+    PointSolution,
+    PressedCases,
+    make_level,
+    make_patch,
+    press_on_level,
+)
+from .values import contact_reaches_steep_end
 
-# Largest number of contacts for which the meshes of many cases are graded: half of them equally spaced in the order of
-# their left ends, half in that of their right ends
-MAX_GRADED_CONTACTS = 48
-# Largest number of cases whose contacts are searched for before the meshes are chosen
-MAX_SEARCHED_CASES = 256
-# Largest number of contact searches for many cases: the columns of their grids reach the limit in the second search, and
-# further searches hardly move them
-MAX_SEARCHES = 3
-# Largest number of interface nodes of meshes that many cases share; a finer mesh slows down every case
-MAX_SHARED_NODES = 500
-# Number of nested meshes of many cases. The first one has cells twice as long as that of a single run, so that the finest of
-# four takes the time of that of three, while errors of limits from four values are half as large
-N_CASE_MESHES = 4
-# Largest part of the cases of a mesh, and number of them, that get one further mesh; more of them get two
+# Largest part of the cases of a mesh that gets one further mesh; more of them get two. Of 100 loads, tilts and crowns, parts
+# of 0.2 to 1 took the same CPU time within 6 %
 MAX_SHARE_OF_ONE_GROUP = 1 / 3
-MAX_CASES_OF_ONE_GROUP = 40
 MAX_CHUNK_VALUES = 4_000_000  # numbers of a temporary array of cases, columns and nodes, 32 MB
 # Error of the centre of a contact on a mesh for many contacts, in cell lengths: an end lies anywhere in its cell, and half
 # of its position error remains. In 280 random crowned blocks, it was at most 0.0061 where the changes between meshes are
@@ -48,65 +59,9 @@ MAX_CHUNK_VALUES = 4_000_000  # numbers of a temporary array of cases, columns a
 CENTRE_ERROR_IN_CELLS = MIN_CONTACT_EDGE_ERROR_IN_CELLS / 2
 # Number of contact sets beyond which a table is emptied between two parts of the cases; of 500 nodes, 0.1 GB
 MAX_TABLE_SETS = 6000
-
-
-class ContactPlaces(NamedTuple):
-    """Where n contacts begin and end along the interface, independent of a mesh.
-
-    - begins (n,): whether the first node is in contact.
-    - crossings (n, e): positions [m] at which contact begins or ends, by increasing x; NaN beyond the last one.
-    """
-
-    begins: np.ndarray
-    crossings: np.ndarray
-
-    def take(self, rows) -> "ContactPlaces":
-        """Return selected contacts; `rows` are indices or a mask (n,)."""
-        return ContactPlaces(self.begins[rows], self.crossings[rows])
-
-    def find_sets(self, x) -> np.ndarray:
-        """Return the contact sets (n, m) of nodes at ascending positions x (m,) [m]."""
-        counts = np.zeros((len(self.begins), x.size), np.int64)
-        for crossing in self.crossings.T:
-            counts += crossing[:, None] < x
-        return (counts % 2 == 1) ^ self.begins[:, None]
-
-
-def find_contact_places(pressed: PressedCases) -> ContactPlaces:
-    """Return where the contacts of pressed cases begin and end along the interface."""
-    edges = find_contact_edges(pressed)
-    x = pressed.x
-    crossings = x[edges.node] + edges.fraction * (x[edges.node + edges.side] - x[edges.node])
-    return ContactPlaces(pressed.active[:, 0], np.where(edges.exists, crossings, np.nan))
-
-
-def join_places(parts: Sequence[ContactPlaces]) -> ContactPlaces:
-    """Return the contacts of several parts of the cases one after the other."""
-    counts = [part.crossings.shape for part in parts]
-    crossings = np.full((sum(n for n, _ in counts), max(e for _, e in counts)), np.nan)
-    first = 0
-    for part, (n_contacts, n_crossings) in zip(parts, counts):
-        crossings[first : first + n_contacts, :n_crossings] = part.crossings
-        first += n_contacts
-    return ContactPlaces(np.concatenate([part.begins for part in parts]), crossings)
-
-
-def find_contact(patch_model, number: int, pressed: PressedCases, row: int) -> grids.SolvedContact:
-    """Return the contact of a case for which a mesh is graded.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch of all cases.
-    number : int
-        Number of the case.
-    pressed : PressedCases
-        Pressed cases.
-    row : int
-        Row of the case in `pressed`.
-    """
-    extent = grids.find_contact_extent(pressed, row)
-    return grids.SolvedContact(take_patch(patch_model, number), [extent])
+Bodies = Sequence[
+    Any
+]  # meshes of both pieces, `pieces.Mesh`; None for the upper one of identical pieces
 
 
 def collect_facts(pressed: PressedCases) -> np.ndarray:
@@ -130,10 +85,27 @@ class OpenCases(NamedTuple):
     places: ContactPlaces | None
     series: list[MeshValues]
 
+    def find_sets(self, x) -> np.ndarray:
+        """Return the contact sets (k, m) at nodes x (m,) [m] from which the search starts; empty ones without places."""
+        if self.places is None:
+            return np.zeros((self.numbers.size, x.size), bool)
+        return self.places.find_sets(x)
+
     def take(self, rows) -> "OpenCases":
         """Return selected cases; `rows` are indices or a mask (k,)."""
         places = None if self.places is None else self.places.take(rows)
         return OpenCases(self.numbers[rows], places, [mesh.take(rows) for mesh in self.series])
+
+
+class SinglePatch(NamedTuple):
+    """What the solution of a single patch, of which its `Patch` on each mesh is wanted, depends on besides its model.
+
+    - solved: patches of an earlier pass, from fine to coarse, which are not solved again.
+    - with_errors: whether the patch is solved on coarser meshes, too, from which its errors follow.
+    """
+
+    solved: tuple[Patch, ...] = ()
+    with_errors: bool = True
 
 
 def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
@@ -155,12 +127,36 @@ def solve_cases(patch_model, count: int, tolerance: float) -> Batch:
     -------
     Batch
     """
-    solver = _CaseSolver(patch_model, make_cases(patch_model, count), tolerance)
-    if patch_model.mesh.is_automatic:
-        solver.solve()
-    else:
-        solver.solve_on_given_meshes()
-    return solver.batch
+    if count == 1:
+        patch_model = take_patch(patch_model, 0)
+    return _CaseSolver(patch_model, count, tolerance).solve()
+
+
+def solve_single_patch(patch_model, tolerance: float, single: SinglePatch) -> Patches:
+    """Return a patch on its meshes, from fine to coarse; the first one has the static measures with their errors.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch to solve.
+    tolerance : float
+        Relative error that the static measures have to meet.
+    single : SinglePatch
+        Whether the errors are wanted, and what is solved already.
+
+    Raises
+    ------
+    PatchfemError
+        If the patch cannot be solved.
+    """
+    solver = _CaseSolver(patch_model, 1, tolerance, single)
+    batch = solver.solve()
+    # A mesh whose cells are too short for double precision is left out.
+    if not solver.patches:
+        raise batch.messages[0]
+    if solver.patches[0].measures is None:
+        return with_static_measures(solver.patches, tolerance)
+    return solver.patches
 
 
 class _CaseSolver:
@@ -170,35 +166,76 @@ class _CaseSolver:
     ----------
     patch_model : PatchModel
         Patch of all cases, whose numbers may be arrays.
-    cases : Cases
-        The same cases as columns.
+    count : int
+        Number n of cases.
     tolerance : float
         Relative error of the static measures.
+    single : SinglePatch, optional
+        If the only case is to have its `Patch` on each mesh.
+
+    Attributes
+    ----------
+    patches : tuple of Patch
+        A single patch on its meshes, from fine to coarse; () for cases of which only the measures are wanted.
     """
 
-    def __init__(self, patch_model, cases: Cases, tolerance: float):
+    def __init__(
+        self, patch_model, count: int, tolerance: float, single: SinglePatch | None = None
+    ):
         self.patch_model = patch_model
-        self.cases = cases
+        self.cases = make_cases(patch_model, count)
         self.tolerance = tolerance
-        self.batch = Batch.blank(cases.n_cases)
-        self.contacts: dict[int, grids.SolvedContact] = {}
+        self.single = single
+        self.batch = Batch.blank(count)
+        self.contacts: dict[int, SolvedContact] = {}
+        self.patches: tuple[Patch, ...] = ()
+        self.points = None
+        self.has_tried_points = False
 
-    def solve(self) -> None:
+    def solve(self) -> Batch:
         """Solve the cases on meshes that they share, and those that miss the tolerance on meshes of smaller groups."""
-        numbers = np.arange(self.cases.n_cases)
-        search = _ContactSearch(self.patch_model, self.cases, numbers)
-        layout, _ = grids.search_layout(self.patch_model, search.find_contacts, MAX_SEARCHES)
-        groups = [(OpenCases(numbers, search.guess_places(), []), layout)]
+        cases = OpenCases(np.arange(self.cases.n_cases), None, [])
+        if not self.patch_model.mesh.is_automatic:
+            levels = grids.make_given_meshes(self.patch_model)
+            if not self.has_errors:
+                levels = levels[:1]
+            self._refine(cases, levels[-1], levels[-2::-1])
+            return self.batch
+
+        groups = [self._choose_first_meshes(cases)]
         while groups:
-            cases, layout = groups.pop()
-            fine = grids.make_grids(self.patch_model, layout)
-            missing = self._refine(cases, [grid.coarsen() for grid in fine])
+            cases, bodies = groups.pop()
+            missing = self._refine(cases, bodies)
             # A case that is alone has reached the limit of the mesh
             if missing.size and cases.numbers.size > 1:
                 groups += self._regroup(missing, cases.numbers.size)
+        return self.batch
 
-    def _regroup(self, numbers: np.ndarray, n_before: int) -> list[tuple[OpenCases, Layout]]:
-        """Return groups of cases (k,) that miss the tolerance on a mesh, with the columns of their next meshes.
+    @property
+    def has_errors(self) -> bool:
+        """Whether the errors follow from coarser meshes."""
+        return self.single is None or self.single.with_errors
+
+    def _choose_first_meshes(self, cases: OpenCases) -> tuple[OpenCases, Bodies]:
+        """Return the cases with what is known of their contacts, and the coarsest of their meshes."""
+        if self.single is not None and self.single.solved:
+            return cases, self.single.solved[-1].pair.meshes
+        if self.cases.n_cases == 1:
+            bodies = grids.make_base_grids(self.patch_model).bodies
+            n_halvings = 0 if self.has_errors else grids.MIN_NESTED_MESHES - 1
+            return cases, grids.halve_cells(bodies, n_halvings)
+        search = ContactSearch(self.patch_model, self.cases.n_cases)
+        layout, _ = grids.search_layout([search])
+        bodies = self._make_bodies(layout, self.cases.n_cases)
+        return cases._replace(places=search.guess_places()), bodies
+
+    def _make_bodies(self, layout: Layout, count: int) -> Bodies:
+        """Return the coarsest meshes of `count` cases with the columns of a layout."""
+        bodies = grids.make_grids(self.patch_model, layout)
+        return bodies if count == 1 else [body.coarsen() for body in bodies]
+
+    def _regroup(self, numbers: np.ndarray, n_before: int) -> "list[tuple[OpenCases, Bodies]]":
+        """Return groups of cases (k,) that miss the tolerance on a mesh, with the coarsest of their next meshes.
 
         Two groups have contacts that end at similar places. A small part of the `n_before` cases of a mesh stays together,
         because a mesh for its contacts alone is much finer there.
@@ -206,23 +243,16 @@ class _CaseSolver:
         spans = np.array([self.contacts[number].extents[0].span for number in numbers.tolist()])
         side = np.ptp(spans, axis=0).argmax()
         numbers = numbers[np.argsort(spans[:, side], kind="stable")]
-        n_most = min(MAX_SHARE_OF_ONE_GROUP * n_before, MAX_CASES_OF_ONE_GROUP)
-        n_groups = 1 if numbers.size <= n_most else 2
+        n_groups = 1 if numbers.size <= MAX_SHARE_OF_ONE_GROUP * n_before else 2
         groups = []
         for part in filter(len, np.array_split(numbers, n_groups)):
             spread = np.linspace(0, part.size - 1, min(part.size, MAX_GRADED_CONTACTS))
             graded = part[spread.round().astype(int)].tolist()
             layout = grids.make_common_layout([self.contacts[number] for number in graded])
-            groups.append((OpenCases(part, None, []), layout))
+            groups.append((OpenCases(part, None, []), self._make_bodies(layout, part.size)))
         return groups
 
-    def solve_on_given_meshes(self) -> None:
-        """Solve all cases on the meshes that the scene prescribes."""
-        levels = mesh_levels.make_given_meshes(self.patch_model)
-        numbers = np.arange(self.cases.n_cases)
-        self._refine(OpenCases(numbers, None, []), levels[-1], levels[-2::-1])
-
-    def _refine(self, cases: OpenCases, bodies, given=()) -> np.ndarray:
+    def _refine(self, cases: OpenCases, bodies: Bodies, given: Sequence[Bodies] = ()) -> np.ndarray:
         """Solve cases on nested meshes; return the numbers of those that miss the tolerance on the finest one.
 
         Each further mesh halves the cells for the cases that miss the tolerance on the one before.
@@ -236,59 +266,80 @@ class _CaseSolver:
         given : sequence
             Finer meshes if the scene prescribes them.
         """
-        max_nodes = MAX_SHARED_NODES if cases.numbers.size > 1 else np.inf
-        nested = mesh_levels.NestedMeshes(self.patch_model, given, max_nodes)
-        if self.patch_model.mesh.is_automatic:
-            nested.n_needed = N_CASE_MESHES
+        is_shared = self.patch_model.mesh.is_automatic and cases.numbers.size > 1
+        nested = grids.NestedMeshes(self.patch_model, given, is_shared=is_shared)
+        if not self.has_errors:
+            nested.n_needed = 1
 
-        def press(bodies, before: mesh_levels.SolvedMeshes | None) -> mesh_levels.SolvedMeshes:
-            """Press the cases that the meshes before have left."""
+        def press(bodies: Bodies, before: grids.SolvedMeshes | None) -> grids.SolvedMeshes | None:
+            """Press the cases that the meshes before have left; None if a single patch has no solution on the mesh."""
             before = before.solution if before else cases
-            pair = condense(self.patch_model, *bodies, keep_factors=False)
-            n_meshes = len(before.series) + 1
-            done = self._press_parts(before, pair, is_judged=n_meshes >= nested.n_needed)
+            level = self._make_level(bodies, len(before.series) + 1, nested)
+            done = self._press_on_mesh(before, level, nested)
+            if done is None:
+                return None
             excess = self.batch.excess[done.numbers].max(initial=0.0)
-            return mesh_levels.SolvedMeshes(n_meshes, pair.meshes, excess, done)
+            return grids.SolvedMeshes(len(before.series) + 1, level.pair.meshes, excess, done)
 
         last, _ = refine(press, bodies, nested.judge, NO_LIMIT)
-        return last.solution.numbers
+        return last.solution.numbers if last else np.zeros(0, int)
 
-    def _press_parts(self, before: OpenCases, pair: CondensedPair, *, is_judged: bool) -> OpenCases:
-        """Press cases on a mesh, in parts that limit the memory, and return those that go on.
+    def _make_level(self, bodies: Bodies, n_meshes: int, nested: grids.NestedMeshes) -> Level:
+        """Return the pieces on meshes, which are the n-th of the nested ones; those of an earlier pass are not condensed."""
+        keep_factors = False
+        if self.single is not None:
+            if n_meshes <= len(self.single.solved):
+                return self.single.solved[-n_meshes].pressed.level
+            # Only the last mesh needs factors, for the stress inside the pieces, which is computed on a coarser mesh if this
+            # one is expensive. The patches of many rigs do not keep them.
+            for patch in self.patches[:1]:
+                patch.pair.forget_factors()
+            keep_factors = self.patch_model.mesh.is_fine and n_meshes >= nested.n_needed
+            keep_factors &= not grids.is_too_expensive(self.patch_model, bodies)
+        return make_level(
+            self.patch_model, condense(self.patch_model, *bodies, keep_factors=keep_factors)
+        )
+
+    def _press_on_mesh(
+        self, before: OpenCases, level: Level, nested: grids.NestedMeshes
+    ) -> OpenCases | None:
+        """Press cases on a mesh, and return those that go on; None if a single patch has no solution on it.
+
+        From the mesh on that the errors need, measures are kept with their errors, and only cases that miss the tolerance go
+        on. A case that cannot be pressed is not pressed on the next mesh.
 
         Parameters
         ----------
         before : OpenCases
             Cases with their contacts and measures on the meshes before.
-        pair : CondensedPair
+        level : Level
             Pieces on the mesh.
-        is_judged : bool
-            Whether the measures are kept with their errors, and only cases that miss the tolerance go on.
+        nested : NestedMeshes
+            Meshes of the cases.
         """
         numbers = before.numbers
-        level = make_level(self.patch_model, pair)
+        is_judged = len(before.series) + 1 >= nested.n_needed
         goes_on = np.ones(numbers.size, bool)
         parts = []
-
-        # A case that cannot be pressed, or that meets its tolerance, is not pressed on the next mesh.
-        for rows in _split_rows(numbers.size, level):
+        for rows, pressed, errors in self._press_parts(before, level):
             part = before.take(rows)
-            start = np.zeros((rows.size, level.x.size), bool)
-            if part.places is not None:
-                start = part.places.find_sets(level.x)
-            pressed, errors = press_on_level(level, self.cases.take(part.numbers), start)
             values = collect_mesh_values(pressed)
+            for row, error in errors.items():
+                goes_on[rows[row]] = False
+                self.batch.fail(int(part.numbers[row]), error)
+            if self.single is not None and errors:
+                return None
 
             # Contacts of the cases that go on grade the meshes of their groups.
             if is_judged:
                 series = [*part.series, values]
-                goes_on[rows] = self._keep_measures(part.numbers, pressed, series, errors)
-                for row in np.flatnonzero(goes_on[rows]):
+                is_missed = self._keep_measures(part.numbers, pressed, series, errors, nested)
+                goes_on[rows] &= is_missed | (nested.n_finer > 0)
+                for row in np.flatnonzero(is_missed & nested.is_shared):
                     number = int(part.numbers[row])
-                    self.contacts[number] = find_contact(self.patch_model, number, pressed, row)
-            for row, error in errors.items():
-                goes_on[rows[row]] = False
-                self.batch.fail(int(part.numbers[row]), error)
+                    extent = find_contact_extent(pressed, row)
+                    patch = take_patch(self.patch_model, number)
+                    self.contacts[number] = SolvedContact(patch, [extent])
 
             parts.append((values, find_contact_places(pressed)))
             level.limit_sets(MAX_TABLE_SETS)
@@ -297,7 +348,30 @@ class _CaseSolver:
         series = [*before.series, join_mesh_values(values)]
         return OpenCases(numbers, join_places(places), series).take(goes_on)
 
-    def _keep_measures(self, numbers, pressed: PressedCases, series, errors) -> np.ndarray:
+    def _press_parts(
+        self, before: OpenCases, level: Level
+    ) -> Iterator[tuple[np.ndarray, PressedCases, dict[int, PatchfemError]]]:
+        """Press cases on a mesh, in parts that limit the memory: their rows, the pressed cases and errors by their rows.
+
+        A single patch becomes the first of `patches`; that of an earlier pass is not pressed again.
+        """
+        n_meshes = len(before.series) + 1
+        if self.single is not None and n_meshes <= len(self.single.solved):
+            self.patches = self.single.solved[-n_meshes:]
+            yield np.arange(1), self.patches[0].pressed, {}
+            return
+        for rows in _split_rows(before.numbers.size, level):
+            begin = process_time()
+            part = before.take(rows)
+            start = part.find_sets(level.x)
+            pressed, errors = press_on_level(level, self.cases.take(part.numbers), start)
+            if self.single is not None and not errors:
+                self.patches = (make_patch(pressed, process_time() - begin), *self.patches)
+            yield rows, pressed, errors
+
+    def _keep_measures(
+        self, numbers, pressed: PressedCases, series, errors, nested: grids.NestedMeshes
+    ) -> np.ndarray:
         """Estimate the errors of cases, and keep their measures; return whether they miss the tolerance (k,).
 
         Parameters
@@ -310,16 +384,22 @@ class _CaseSolver:
             Their measures on all meshes from coarse to fine.
         errors : dict
             Errors of the cases that could not be pressed, by their rows.
+        nested : NestedMeshes
+            Meshes of the cases.
         """
-        mesh = self.patch_model.mesh
         length = self.patch_model.pieces.length
-        tolerance = self.tolerance if mesh.is_automatic else None
+        tolerance = self.tolerance if self.patch_model.mesh.is_automatic else None
         is_solved = np.ones(len(pressed), bool)
         is_solved[list(errors)] = False
         excess = np.full(len(pressed), np.inf)
-        # The errors that three meshes give hold as well as those with a coarser one, which are larger or smaller
-        for used in (series[-grids.MIN_NESTED_MESHES :], series):
-            estimates = estimate_static_measures(pressed, used, tolerance, CENTRE_ERROR_IN_CELLS)
+        choices = [series]
+        centre_error = None
+        if nested.is_shared:
+            # The errors that three meshes give hold as well as those with a coarser one, which are larger or smaller
+            choices = [series[-grids.MIN_NESTED_MESHES :], series]
+            centre_error = CENTRE_ERROR_IN_CELLS
+        for used in choices:
+            estimates = estimate_static_measures(pressed, used, tolerance, centre_error)
             own_excess = estimates.excess(self.tolerance, length)
             found = CaseMeasures(
                 estimates.names,
@@ -331,76 +411,49 @@ class _CaseSolver:
             )
             self.batch.put(numbers[is_solved], found.take(is_solved))
             excess = np.minimum(excess, own_excess)
-            if excess.max() <= 1 or len(used) == len(series):
+            if excess.max() <= 1:
                 break
+        if self.single is not None:
+            excess[0] = self._measure_patch(estimates)
         return excess > 1
 
+    def _measure_patch(self, estimates: StaticEstimates) -> float:
+        """Add its measures to a single patch, and return the largest ratio of error to allowed error on its finest mesh.
 
-class _ContactSearch:
-    """Search for the contacts of many cases, for which their meshes are graded.
+        If the next mesh of a patch with a profile is expensive, the measures are computed on points as dense as the profile,
+        and the mesh only serves fields and motion. Points replace a mesh that would take longer than those of a rig. Where
+        they do not converge, they would not do so beside the next mesh either.
+        """
+        patch, *coarse = self.patches
 
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Patch of all cases.
-    cases : Cases
-        n cases, of which MAX_SEARCHED_CASES are pressed: equally spaced ones in the order of their columns, and those with
-        extreme columns.
-    numbers : (n,) ndarray
-        Numbers of the cases in the model.
-    """
+        def find_excess(points: PointSolution | None) -> float:
+            """Add the measures with a solution on points, and return the excess of those that control the mesh."""
+            self.patches = (add_measures(patch, estimates, self.tolerance, points), *coarse)
+            return max_mesh_error_ratio(self.patches[0].measures, self.tolerance)
 
-    def __init__(self, patch_model, cases: Cases, numbers: np.ndarray):
-        self.patch_model = patch_model
-        self.columns = np.nan_to_num(np.column_stack([*cases.holders, cases.amplitudes]))
-        order = np.lexsort(self.columns.T[::-1])
-        even = np.linspace(0, cases.n_cases - 1, min(cases.n_cases, MAX_SEARCHED_CASES))
-        extreme = [*self.columns.argmin(axis=0), *self.columns.argmax(axis=0)]
-        self.rows = np.unique([*order[even.round().astype(int)], *extreme])
-        self.cases = cases.take(self.rows)
-        self.numbers = numbers[self.rows]
-        self.places: ContactPlaces | None = None
+        excess = find_excess(self.points)
+        if excess > 1 and not self.has_tried_points and self._prefers_points(patch):
+            self.has_tried_points = True
+            self.points = self.single.solved[0].points if self.single.solved else None
+            if self.points is None:
+                self.points = profile_points.solve_on_points(
+                    self.patch_model, lambda points: find_excess(points) <= 1
+                )
+            excess = find_excess(self.points)
+        # The points do not determine a peak that may be at a free corner, but a finer mesh does.
+        has_peak = self.points is not None and "pressure_peak" in self.points.measures
+        return 0.0 if has_peak else excess
 
-    def find_contacts(self, pair: CondensedPair) -> list[grids.SolvedContact]:
-        """Return the contacts for which the next grid is graded, from the pieces on a grid."""
-        level = make_level(self.patch_model, pair)
-        start = np.zeros((self.cases.n_cases, level.x.size), bool)
-        if self.places is not None:
-            start = self.places.find_sets(level.x)
-        pressed, errors = press_on_level(level, self.cases, start)
-        self.places = find_contact_places(pressed)
-        is_loaded = pressed.load > 0
-        is_loaded[list(errors)] = False
-        contacts = []
-        for row in _spread_contacts(pressed.active, np.flatnonzero(is_loaded)):
-            contacts.append(find_contact(self.patch_model, int(self.numbers[row]), pressed, row))
-        return contacts
-
-    def guess_places(self) -> ContactPlaces:
-        """Return for each case the contact of the searched case whose numbers are nearest, relative to their ranges."""
-        scale = np.ptp(self.columns, axis=0)
-        scaled = self.columns / np.where(scale > 0, scale, 1.0)
-        distances = ((scaled[:, None] - scaled[self.rows]) ** 2).sum(axis=2)
-        return self.places.take(distances.argmin(axis=1))
-
-
-def _spread_contacts(active, rows: np.ndarray) -> list[int]:
-    """Select at most MAX_GRADED_CONTACTS of some contact sets, equally spaced in the order of their ends.
-
-    `active` (n, m) are contact sets, and `rows` (k,) the numbers of those that are selected from.
-    """
-    if rows.size <= MAX_GRADED_CONTACTS:
-        return rows.tolist()
-    even = np.linspace(0, rows.size - 1, MAX_GRADED_CONTACTS // 2).round().astype(int)
-    first = active[rows].argmax(axis=1)
-    last = active[rows, ::-1].argmax(axis=1)
-    orders = (np.argsort(place, kind="stable") for place in (first, last))
-    return np.unique([rows[order[even]] for order in orders]).tolist()
+    def _prefers_points(self, patch: Patch) -> bool:
+        """Return whether points of a profile replace the next mesh of a patch, which would take long."""
+        seconds = grids.predict_condensing_seconds(grids.halve_cells(patch.pair.meshes))
+        is_expensive = seconds > grids.COARSE_GRID_DENSITY.max_condensing_seconds
+        return is_expensive and profile_points.can_use_points(self.patch_model)
 
 
 def _split_rows(count: int, level: Level) -> list[np.ndarray]:
     """Return the numbers of `count` cases in parts whose arrays of nodes on a level need little memory."""
-    size = max(1, MAX_CHUNK_VALUES // (level.x.size * (2 + len(level.shapes))))
+    size = max(1, MAX_CHUNK_VALUES // (level.x.size * (2 + len(level.gap.shapes))))
     return np.split(np.arange(count), range(size, count, size))
 
 

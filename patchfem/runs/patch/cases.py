@@ -19,7 +19,7 @@ from ...core import PatchfemError
 from ...model.gap import Gap
 from ...model.patch import PatchModel
 from ...scene.keys.types import Table
-from ..results.patch_rows import POSITIVE_MESH_MEASURES, Arrays
+from ..results.patch_rows import POSITIVE_MESH_MEASURES, Arrays, Values
 
 
 class OutcomeCode(IntEnum):
@@ -162,8 +162,21 @@ def take_patch(patch_model: PatchModel, case: int) -> PatchModel:
     return replace(patch_model, gap=gap, loading=replace(loading, **numbers))
 
 
-def make_gap_shapes(patch_model: PatchModel, x, end_gap) -> np.ndarray:
-    """Return the gap shapes (p, m) [m per unit amplitude] of a group of cases at the nodes of a mesh.
+class GapShapes(NamedTuple):
+    """Gap shapes of a group of cases at the m nodes of a mesh.
+
+    - shapes (p, m): shapes [m per unit amplitude].
+    - notes: sentences on a profile.
+    - seconds: CPU seconds by name of the shape.
+    """
+
+    shapes: np.ndarray
+    notes: tuple[str, ...]
+    seconds: Values
+
+
+def make_gap_shapes(patch_model: PatchModel, x, end_gap) -> GapShapes:
+    """Return the gap shapes of a group of cases at the nodes of a mesh.
 
     A table with a number that scales its shape gives a shape of unit amplitude. All other parts of the gap, if there are
     any, are one shape. The last one, for gaps with a step, is 1 at a node on the edge of the step.
@@ -182,12 +195,15 @@ def make_gap_shapes(patch_model: PatchModel, x, end_gap) -> np.ndarray:
     for name, keys, properties in split.scaled:
         numbers = {key: value for key, value in keys if key != "on"} | dict(properties.unit)
         shapes.append(getattr(contact.gaps, name)(x, **numbers))
+    notes = ()
+    seconds = {}
     if split.has_rest:
-        shapes.append(split.rest.evaluate(x).heights + end_gap)
+        heights, notes, seconds = split.rest.evaluate(x)
+        shapes.append(heights + end_gap)
     edges = patch_model.gap.step_edges
     if edges:
         shapes.append(np.isin(x, edges).astype(float))
-    return np.array(shapes).reshape(-1, x.size)
+    return GapShapes(np.array(shapes).reshape(-1, x.size), notes, seconds)
 
 
 class MeshFact(IntEnum):

@@ -7,24 +7,28 @@ small tolerance contain those for a large one. `mesh_levels` decides how many gr
 `plan` predicts their number. Read `make_base_grids` first, then `make_column_layout`.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from math import copysign
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError
+from ...mesh import pieces as piece_meshes
 from ...mesh.grading import Layout, RowHeights, divide_into_columns, divide_into_rows
 from ...mesh.grid import TensorGrid
-from ...model.patch import PatchModel
-from ...model.pieces import estimate_rounded_length, extend_grid
-from . import slip_zones, store
-from .condensed import CondensedPair, condense
-from .press import Patch, PressedCases, solve_patch_contact
-from .values import find_contact_edges
+from ...model.pieces import estimate_rounded_length, extend_grid, make_piece_meshes
+from ..refine import Verdict
+from . import store
+from .condensed import condense
+from .contact_search import (
+    MAX_GRADED_CONTACT_ENDS,
+    ContactExtent,
+    ContactSearch,
+    Pairs,
+    SolvedContact,
+)
 
 # Largest number of columns of the coarsest grid; a layout with more columns is coarsened
 # everywhere.
@@ -34,11 +38,6 @@ MAX_GRID_COLUMNS = 120
 MIN_CELL_LENGTH_RATIO = 4e-9
 # Ratio of the cell length at a contact edge to that at a step of the gap.
 EDGE_TO_GAP_STEP_CELL_RATIO = 8
-# Largest number of contact edges for which the mesh is graded; with more edges it has equal
-# columns.
-MAX_GRADED_CONTACT_ENDS = 12
-# Expected range of a varying load, relative to its mean.
-VARYING_LOAD_FACTORS = (0.5, 1.5)
 # Ratio of the longest cell to the length of the interface if wear may move the contact edges.
 MAX_WEAR_CELL_LENGTH_RATIO = 1 / 48
 # Number of cells of the coarsest grid per half-width of a pressure maximum.
@@ -54,13 +53,22 @@ MAX_WAVE_CELL_RATIO = 2.0
 # Largest number of contact searches; each search uses columns graded to the result of the previous
 # one.
 MAX_CONTACT_SEARCHES = 8
+# The same for many cases: the columns of their grids reach the limit in the second search, and a third one took 4 % of the
+# CPU time of 100 loads, tilts and crowns without fewer meshes
+MAX_SEARCHES_FOR_MANY = 2
 # Smallest number of nested meshes at which the order of convergence is known.
 MIN_NESTED_MESHES = 3
+# Largest number of interface nodes of meshes that many cases share; a finer mesh slows down every case
+MAX_SHARED_NODES = 500
+# Number of nested meshes of many cases. The first one has cells twice as long as that of a single run, so that the finest of
+# four takes the time of that of three, while errors of limits from four values are half as large
+N_SHARED_MESHES = 4
+# Largest number of columns of a mesh that has no coarser mesh.
+MAX_COLUMNS_WITHOUT_COARSER = 8
 # CPU time [s] of condensing a mesh over (number of nodes)^CONDENSING_NODE_EXPONENT
 CONDENSING_SECONDS_PER_NODE = 4.2e-6
 CONDENSING_NODE_EXPONENT = 1.1
 
-Pairs = tuple[tuple[float, float], ...]  # (start, end) or (position, half-width) [m]
 Bands = list[tuple[float, float, float]]  # (from, to, cell length) [m], as in `Layout.bands`
 
 
@@ -85,32 +93,6 @@ COARSE_GRID_DENSITY = GridDensity(0.9, 10, 0.8)
 def choose_density(patch_model) -> GridDensity:
     """Return how dense the grids of a patch are: coarser in a rig or with wear, where each node slows down every step."""
     return FINE_GRID_DENSITY if patch_model.mesh.is_fine else COARSE_GRID_DENSITY
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ContactExtent:
-    """Region of contact with its edges, corners, pressure maxima and slip zones.
-
-    - span: (start, end) [m] of the loaded part of the interface.
-    - places: positions [m] of the contact edges inside the interface; for a contact that is too
-      small to resolve, its nodes.
-    - corners: ends of the interface that carry pressure [m].
-    - cell: longest cell [m] in which the contact ends; inf for an unresolved contact.
-    - crests: (position, half-width) [m] of the largest pressure maxima.
-    - slip_zones: (start, end) [m] of the zones that slip under a prescribed displacement.
-    """
-
-    span: tuple[float, float]
-    places: tuple[float, ...]
-    corners: tuple[float, ...]
-    cell: float
-    crests: Pairs = ()
-    slip_zones: Pairs = ()
-
-    @property
-    def width(self) -> float:
-        """Length [m] of the loaded part of the interface."""
-        return self.span[1] - self.span[0]
 
 
 class BaseGrids(NamedTuple):
@@ -145,29 +127,18 @@ def make_base_grids(patch_model) -> BaseGrids:
 
     def search() -> BaseGrids:
         """Search for the contact region, and grade the grids to it."""
-        layout, contact = search_layout(patch_model, partial(find_contacts_alone, [patch_model]))
+        layout, contact = search_layout([ContactSearch(patch_model, 1)])
         return BaseGrids(make_grids(patch_model, layout), contact)
 
     return store.get_or_compute(key, search)
 
 
-class SolvedContact(NamedTuple):
-    """Contact regions of a patch in a search: its PatchModel, and the regions under its loads."""
-
-    model: PatchModel
-    extents: list[ContactExtent]
-
-
-def search_layout(
-    patch_model,
-    find_contacts: Callable[[CondensedPair], list[SolvedContact]],
-    max_searches: int = MAX_CONTACT_SEARCHES,
-) -> tuple[Layout, ContactExtent | None]:
-    """Search for the contact regions of patches of equal geometry on grids that are graded towards the previous result.
+def search_layout(searches: Sequence[ContactSearch]) -> tuple[Layout, ContactExtent | None]:
+    """Search for the contacts of patches of equal geometry on grids that are graded towards the previous result.
 
     The contact is solved on a coarse grid, and the columns of the next grid are short at the edges of this
     contact. The search ends when the cells at all edges are short compared to the contact, after
-    `max_searches` solutions at most.
+    MAX_CONTACT_SEARCHES or MAX_SEARCHES_FOR_MANY solutions at most.
 
     If a varying load moves the contact edges, the columns are short wherever the edges lie between
     VARYING_LOAD_FACTORS times the load. If wear moves them, no column is longer than
@@ -175,12 +146,8 @@ def search_layout(
 
     Parameters
     ----------
-    patch_model : PatchModel
-        Pieces and mesh settings of all patches.
-    find_contacts : callable
-        Function of the pieces on a grid that returns the contacts for which the next grid is graded; [] without a load.
-    max_searches : int
-        Largest number of searches.
+    searches : sequence of ContactSearch
+        Patches with the same pieces, steps and mesh settings.
 
     Returns
     -------
@@ -188,15 +155,24 @@ def search_layout(
         Columns of the coarsest grid; even ones without a load.
     contact : ContactExtent or None
         Contact region of the first solved case; None without a load or a solution.
+
+    Raises
+    ------
+    PatchfemError
+        If there is only one case, and it cannot be solved.
     """
+    patch_model = searches[0].patch_model
+    has_many = any(search.n_cases > 1 for search in searches)
     layout = make_search_layout(patch_model)
     contact = None
-    for _ in range(max_searches):
+    for _ in range(MAX_SEARCHES_FOR_MANY if has_many else MAX_CONTACT_SEARCHES):
         pair = condense(patch_model, *make_grids(patch_model, layout), keep_factors=False)
-        solved = find_contacts(pair)
+        solved = list(chain.from_iterable(search.find_contacts(pair) for search in searches))
 
-        # Without a load there is no contact to search for.
+        # Without a load there is no contact to search for. The run of a single patch reports its error.
         if not solved:
+            if len(searches) == 1 and not has_many and searches[0].error is not None:
+                raise searches[0].error
             break
         contact = solved[0].extents[0]
         layout = make_common_layout(solved)
@@ -216,51 +192,6 @@ def search_layout(
 def make_common_layout(solved: list[SolvedContact]) -> Layout:
     """Return the columns of the coarsest grid for the contacts of patches of equal geometry."""
     return _merge_layouts([make_column_layout(*one) for one in solved])
-
-
-def find_contacts_alone(patch_models: list[PatchModel], pair: CondensedPair) -> list[SolvedContact]:
-    """Return the contact regions of patches under their loads and at the ends of their ranges.
-
-    Patches without a load are left out, and those without a solution, unless there is only one.
-
-    Parameters
-    ----------
-    patch_models : list of PatchModel
-        Patches of equal geometry.
-    pair : CondensedPair
-        Their pieces on a grid.
-    """
-    solved = []
-    for patch_model in patch_models:
-        if not patch_model.nominal_load > 0:
-            continue
-        try:
-            loaded_models = (patch_model, *make_load_variants(patch_model))
-            patches = [solve_patch_contact(model, pair) for model in loaded_models]
-        # The single run of a case reports its error.
-        except PatchfemError:
-            if len(patch_models) == 1:
-                raise
-            continue
-        solved.append(SolvedContact(patch_model, list(map(_find_patch_extent, patches))))
-    return solved
-
-
-def _find_patch_extent(patch: Patch) -> ContactExtent:
-    """Return the contact region of a patch, with the zones that slip under its prescribed slide."""
-    slip = patch.model.mesh.slip
-    extent = find_contact_extent(patch.pressed, 0)
-    if slip is None or not np.isfinite(extent.cell):
-        return extent
-    return replace(extent, slip_zones=slip_zones.find_slip_zones(patch, slip))
-
-
-def make_load_variants(patch_model) -> list[PatchModel]:
-    """Return the patch at the ends of the range of a varying load; [] if no load moves its edges."""
-    load = patch_model.loading.load
-    if patch_model.mesh.edge_motion != "load" or load is None:
-        return []
-    return [patch_model.with_loading(load=factor * load) for factor in VARYING_LOAD_FACTORS]
 
 
 def _resolves_span(layout: Layout, x, ratio: float, span: tuple[float, float]) -> bool:
@@ -430,73 +361,6 @@ def _min_coating_thickness(patch_model) -> float:
     return min(filter(None, thicknesses), default=np.inf)
 
 
-def find_contact_extent(pressed: PressedCases, case: int) -> ContactExtent:
-    """Return the contact region of a case on a coarse grid, or without contact the cells around its smallest gap.
-
-    A smooth asperity layer carries pressure everywhere, so that only pressures above a thousandth
-    of the peak count.
-
-    Parameters
-    ----------
-    pressed : PressedCases
-        Cases on the grid.
-    case : int
-        Number of the case.
-    """
-    x = pressed.x
-    pressure = pressed.pressure[case]
-    is_loaded = pressure > (1e-3 * pressure.max() if pressed.level.is_smooth else 0.0)
-    loaded_nodes = np.flatnonzero(is_loaded)
-    if not loaded_nodes.size:
-        loaded_nodes = np.array([np.argmin(pressed.gap[case])])
-    low = x[max(loaded_nodes[0] - 1, 0)]
-    high = x[min(loaded_nodes[-1] + 1, x.size - 1)]
-
-    # Around a contact of few nodes, the next search has shorter cells.
-    if loaded_nodes.size < 4 and loaded_nodes.size < x.size:
-        return ContactExtent((float(low), float(high)), tuple(x[loaded_nodes].tolist()), (), np.inf)
-
-    # An edge lies in the cell between a loaded and a free node; the solver knows it more
-    # accurately.
-    edge_cells = np.flatnonzero(is_loaded[1:] != is_loaded[:-1])
-    edge_positions = (x[edge_cells] + x[edge_cells + 1]) / 2
-    cells = np.diff(x)[edge_cells]
-    if pressed.active[case].any():
-        edges = find_contact_edges(pressed)
-        exists = edges.exists[case]
-        if exists.sum() == edge_cells.size:
-            edge_positions = edges.position[case, exists]
-
-    corners = tuple(float(x[at]) for at in (0, -1) if is_loaded[at])
-    low = edge_positions[0] if loaded_nodes[0] else x[0]
-    high = edge_positions[-1] if loaded_nodes[-1] < x.size - 1 else x[-1]
-    return ContactExtent(
-        (float(low), float(high)),
-        tuple(edge_positions.tolist()),
-        corners,
-        float(cells.max(initial=0.0)),
-        _find_pressure_maxima(x, pressed.contact_pressure[case]),
-    )
-
-
-def _find_pressure_maxima(x, sigma) -> Pairs:
-    """Return (position, half-width) [m] of the pressure maxima inside a contact.
-
-    Both follow from parabolas through three nodal pressures.
-    """
-    # Smallest local pressure maximum, relative to the peak pressure, around which the mesh is
-    # refined.
-    peak_node = np.flatnonzero(
-        (sigma[1:-1] > 0.3 * sigma.max()) & (sigma[1:-1] > sigma[:-2]) & (sigma[1:-1] >= sigma[2:])
-    )
-    slope = np.diff(sigma) / np.diff(x)
-    curvature = -2 * np.diff(slope)[peak_node] / (x[peak_node + 2] - x[peak_node])
-    half_width = np.sqrt(2 * sigma[peak_node + 1] / curvature)
-    if peak_node.size > MAX_GRADED_CONTACT_ENDS:
-        return ()
-    return tuple(zip(x[peak_node + 1].tolist(), half_width.tolist()))
-
-
 def make_grids(patch_model, layout: Layout) -> list[TensorGrid]:
     """Return the grids of both pieces with the columns of a layout; one grid for identical pieces.
 
@@ -565,3 +429,97 @@ def predict_condensing_seconds(bodies) -> float:
         for body in bodies
         if body is not None
     )
+
+
+def make_given_meshes(patch_model) -> "list[tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]]":
+    """Return the meshes of a patch with prescribed element size or mesh file, from fine to coarse.
+
+    The error follows from two coarser grids, or from the unstructured mesh with all edges halved. Meshes with few columns
+    have none of them.
+    """
+    levels = [make_piece_meshes(patch_model)]
+    n_levels = 3 if isinstance(levels[0][0], TensorGrid) else 2
+    while len(levels) < n_levels and levels[-1][0].x.size > MAX_COLUMNS_WITHOUT_COARSER:
+        levels.append(change_elements(levels[-1]))
+    return levels
+
+
+def change_elements(
+    bodies: "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]",
+) -> "tuple[piece_meshes.Mesh, piece_meshes.Mesh | None]":
+    """Return grids with elements twice as long, or unstructured meshes, which have no coarser ones, with halved edges."""
+    is_grid = isinstance(bodies[0], TensorGrid)
+    lower, upper = (body and (body.coarsen() if is_grid else body.refine()) for body in bodies)
+    return lower, upper
+
+
+class SolvedMeshes(NamedTuple):
+    """Solution of one or many patches on nested meshes.
+
+    - n_meshes: number of meshes.
+    - meshes: those of both pieces on the finest level.
+    - excess: largest ratio of error to allowed error of the patches that go on.
+    - solution: solution on all meshes.
+    """
+
+    n_meshes: int
+    meshes: "Sequence[piece_meshes.Mesh | None]"
+    excess: float
+    solution: Any
+
+
+class NestedMeshes:
+    """Nested meshes of one or many patches, which `refine` halves until the patches meet their tolerance.
+
+    At least MIN_NESTED_MESHES meshes are solved, because the error follows from the changes between them. The refinement
+    ends if the next mesh would exceed the CPU time that is allowed for a patch. `PatchMesh.n_finer` more meshes follow.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Patch, or one of the patches with the same pieces.
+    given : sequence
+        Finer meshes if the scene prescribes them.
+    is_shared : bool
+        Whether many patches share the meshes, which are graded to all of their contacts.
+
+    Attributes
+    ----------
+    n_needed : int
+        Number of meshes that the errors need.
+    n_finer : int
+        Number of meshes that follow that of the static measures.
+    """
+
+    def __init__(self, patch_model, given=(), *, is_shared: bool = False):
+        self.patch_model = patch_model
+        self.given = given
+        self.is_shared = is_shared
+        self.n_finer = patch_model.mesh.n_finer
+        self.n_needed = 1 + len(given)
+        if patch_model.mesh.is_automatic:
+            self.n_needed = N_SHARED_MESHES if is_shared else MIN_NESTED_MESHES
+
+    def judge(self, done: SolvedMeshes, excesses: list[float]) -> Verdict:
+        """Decide whether a finer mesh follows; `excesses` are those of the meshes before."""
+        if not self.patch_model.mesh.is_automatic:
+            finer = self.given[done.n_meshes - 1 :][:1]
+            return Verdict(done.excess, *finer)
+        finer = halve_cells(done.meshes)
+        is_last = done.excess <= 1
+        if done.n_meshes >= self.n_needed:
+            is_last |= self.is_shared and finer[0].x.size > MAX_SHARED_NODES
+            is_last = is_last or is_too_expensive(self.patch_model, finer)
+        if is_last:
+            if self.n_finer == 0:
+                return Verdict(done.excess)
+            self.n_finer -= 1
+        return Verdict(done.excess, finer)
+
+
+def is_too_expensive(patch_model, bodies) -> bool:
+    """Return whether condensing the pieces on given meshes takes more CPU time than the finest mesh of a patch may take.
+
+    To condense a piece is to compute its compliance at the interface nodes. `bodies` are the meshes of both pieces.
+    """
+    return predict_condensing_seconds(bodies) > choose_density(patch_model).max_condensing_seconds

@@ -290,26 +290,44 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> Patch
         The patches; the first one is a copy with `Patch.measures` and the points.
     """
     fine, *coarse = patches
-    if points is not None:
-        fine = replace(fine, points=points, averaging=points.spacing)
     meshes = [patch.pressed for patch in (fine, *coarse) if patch is not None]
     estimates = estimate_static_measures(
         fine.pressed,
         [collect_mesh_values(pressed) for pressed in reversed(meshes)],
         tolerance if fine.model.mesh.is_automatic else None,
     )
+    return add_measures(fine, estimates, tolerance, points), *coarse
+
+
+def add_measures(
+    patch: Patch, estimates: StaticEstimates, tolerance: float | None, points=None
+) -> Patch:
+    """Return a patch with its static measures.
+
+    Parameters
+    ----------
+    patch : Patch
+        Patch on its finest mesh.
+    estimates : StaticEstimates
+        Measures of this single case.
+    tolerance : float or None
+        Relative tolerance, which raises the floors of differences of larger terms; None raises no floor.
+    points : PointSolution, optional
+        Solution on the points of a profile, added to the patch.
+    """
     measures = estimates.make_measures(0)
     if points is not None:
+        patch = replace(patch, points=points, averaging=points.spacing)
         measures |= _select_more_accurate_measures(measures, points.measures)
 
     # The floors follow from the values of the points, if these are more accurate
     chosen = [[np.nan if one.value is None else one.value] for one in measures.values()]
     floors = estimates._replace(values=np.array(chosen)).floors(
-        tolerance or 0.0, fine.model.pieces.length
+        tolerance or 0.0, patch.model.pieces.length
     )
     for (name, measure), floor in zip(measures.items(), floors[:, 0]):
         measures[name] = replace(measure, floor=float(floor))
-    return replace(fine, measures=measures), *coarse
+    return replace(patch, measures=measures)
 
 
 def _select_more_accurate_measures(by_mesh: Measures, by_points: Measures) -> Measures:

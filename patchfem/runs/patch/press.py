@@ -20,7 +20,7 @@ from ...elasticity.lapack import use_one_blas_thread
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchModel
 from ..results.patch_rows import Arrays, Measures, Values
-from .cases import Cases, make_cases, make_gap_shapes
+from .cases import Cases, GapShapes, make_cases, make_gap_shapes
 from .condensed import CondensedPair
 from .skin import make_skin_law
 
@@ -66,13 +66,13 @@ class Level:
 
     - model: PatchModel of the group; its load and the numbers of its gap shapes do not matter.
     - pair: condensed pieces.
-    - shapes (p, m): gap shapes [m per unit amplitude].
+    - gap: gap shapes.
     - tangent (m,): compliance [m/N] of a smooth asperity layer that is linearised; else None.
     """
 
     model: PatchModel
     pair: CondensedPair
-    shapes: np.ndarray
+    gap: GapShapes
     tangent: np.ndarray | None = None
 
     @property
@@ -112,7 +112,7 @@ class Level:
 
     def linearise(self, tangent: np.ndarray) -> "Level":
         """Return the pieces with a smooth asperity layer of a tangent compliance (m,) [m/N], without gap shapes."""
-        return Level(self.model, self.pair, self.shapes[:0], tangent)
+        return replace(self, gap=self.gap._replace(shapes=self.gap.shapes[:0]), tangent=tangent)
 
     @cached_property
     def pieces(self) -> Compliance:
@@ -149,7 +149,7 @@ class Level:
         if closing.any():
             shear = np.block([[normal, closing], [closing.T, shear]])
             slide = np.hstack([0 * slide, slide])
-        columns = np.concatenate([self.motions, self.shapes])
+        columns = np.concatenate([self.motions, self.gap.shapes])
         return SetTable(normal, columns, size), SetTable(shear, slide, size)
 
     def limit_sets(self, max_sets: int) -> None:
@@ -367,63 +367,36 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None
     PatchfemError
         If a profile does not fit the mesh, or if the contact cannot be solved.
     """
-    x = pair.compliance.interface.x
-    try:
-        heights, notes, seconds = patch_model.gap.evaluate(x)
-    except UnresolvedTrace as error:
-        from .trace_split import advise_split
-
-        sentences = [str(error), *advise_split(patch_model, float(np.diff(x).max()))]
-        raise PatchfemError("; or ".join(sentences), error.key) from None
-
-    start = np.zeros((1, x.size), bool)
-    if coarse is not None:
-        start[0] = np.interp(x, coarse.x, coarse.pressed.force[0] > 0) > 0.5
-
     begin = process_time()
-    worn = np.zeros(x.size) if worn is None else worn
-    pressed = _press_gap(patch_model, pair, heights + pair.end_gap, worn, start)
-    times = pair.seconds | seconds | {"press": process_time() - begin}
-    return replace(_make_patch(pressed), notes=notes, seconds=times)
-
-
-def _press_gap(patch_model, pair: CondensedPair, gap, worn, start) -> PressedCases:
-    """Press a single case with a gap that is given at the nodes.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-        Model whose load and asperity layer are used.
-    pair : CondensedPair
-        Condensed pieces.
-    gap, worn : (m,) ndarray
-        Gap before wear and worn depth [m].
-    start : (1, m) bool ndarray
-        Contact set from which the search starts; an empty one is replaced by a guess.
-
-    Raises
-    ------
-    PatchfemError
-        If the contact cannot be solved.
-    """
+    level = make_level(patch_model, pair)
     cases = make_cases(patch_model, 1)
-    shapes = [gap + worn]
-    if cases.step_changes is not None:
-        # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
-        # node takes the worn depth of its neighbour there, and on the lower side likewise.
-        is_step = np.isin(pair.compliance.interface.x, patch_model.gap.step_edges)
-        node = int(np.argmax(is_step))
-        neighbours = sorted((node - 1, node + 1), key=lambda neighbour: gap[neighbour])
-        changes = cases.step_changes + worn[neighbours] - worn[node]
-        cases = cases._replace(step_changes=changes)
-        shapes.append(is_step)
+    if worn is not None:
+        level, cases = _add_worn_depth(level, cases, worn)
+    start = np.zeros((1, level.x.size), bool)
+    if coarse is not None:
+        start[0] = np.interp(level.x, coarse.x, coarse.pressed.force[0] > 0) > 0.5
 
-    level = Level(patch_model, pair, np.array(shapes, float))
-    cases = cases._replace(amplitudes=np.eye(1, len(shapes)))
     pressed, errors = press_on_level(level, cases, start)
     for error in errors.values():
         raise error
-    return pressed
+    return make_patch(pressed, process_time() - begin)
+
+
+def _add_worn_depth(level: Level, cases: Cases, worn) -> tuple[Level, Cases]:
+    """Return a level and a single case with a worn depth (m,) [m] added to the gap."""
+    has_step = cases.step_changes is not None
+    if has_step:
+        # The worn depth of the node belongs to a gap at half the height of the step. On the higher side of the step, the
+        # node takes the worn depth of its neighbour there, and on the lower side likewise.
+        gap = cases.amplitudes[0] @ level.gap.shapes
+        node = int(np.argmax(level.gap.shapes[-1]))
+        neighbours = sorted((node - 1, node + 1), key=lambda neighbour: gap[neighbour])
+        changes = cases.step_changes + worn[neighbours] - worn[node]
+        cases = cases._replace(step_changes=changes)
+    place = cases.amplitudes.shape[1] - has_step
+    cases = cases._replace(amplitudes=np.insert(cases.amplitudes, place, 1.0, axis=1))
+    shapes = np.insert(level.gap.shapes, place, worn, axis=0)
+    return replace(level, gap=level.gap._replace(shapes=shapes)), cases
 
 
 def compute_step_weight_shift(pressed: PressedCases, node: int) -> np.ndarray:
@@ -438,8 +411,8 @@ def compute_step_weight_shift(pressed: PressedCases, node: int) -> np.ndarray:
     return shift * (1 - pressed.layer_fraction[:, node])
 
 
-def _make_patch(pressed: PressedCases) -> Patch:
-    """Return the Patch of a single case."""
+def make_patch(pressed: PressedCases, seconds: float) -> Patch:
+    """Return the Patch of a single case, which was pressed in some CPU seconds."""
     patch_model = pressed.level.model
     pair = pressed.level.pair
     loading = patch_model.loading
@@ -473,6 +446,8 @@ def _make_patch(pressed: PressedCases) -> Patch:
         contact_state,
         slip_compliance=slip_compliance,
         unloaded_gap=frozen_array(pressed.unloaded_gap[0]),
+        notes=level.gap.notes,
+        seconds=pair.seconds | level.gap.seconds | {"press": seconds},
         averaging=patch_model.gap.averaging_length(pieces.interface.x, contact_state.sigma_n > 0),
         pressed=pressed,
     )
@@ -487,9 +462,20 @@ def make_level(patch_model, pair: CondensedPair) -> Level:
         Patch of all cases.
     pair : CondensedPair
         Pieces, condensed on the mesh.
+
+    Raises
+    ------
+    PatchfemError
+        If a profile does not fit the mesh.
     """
     x = pair.compliance.interface.x
-    return Level(patch_model, pair, make_gap_shapes(patch_model, x, pair.end_gap))
+    try:
+        return Level(patch_model, pair, make_gap_shapes(patch_model, x, pair.end_gap))
+    except UnresolvedTrace as error:
+        from .trace_split import advise_split
+
+        sentences = [str(error), *advise_split(patch_model, float(np.diff(x).max()))]
+        raise PatchfemError("; or ".join(sentences), error.key) from None
 
 
 def press_on_level(
@@ -518,9 +504,9 @@ def press_on_level(
         pressed, errors = _press_gaps(level, cases, start)
         # A step between two nodes, as on a mesh that the scene prescribes, has no variants
         variants = []
-        has_step_node = cases.step_changes is not None and level.shapes[-1].any()
+        has_step_node = cases.step_changes is not None and level.gap.shapes[-1].any()
         for side, moved in cases.variants if has_step_node else ():
-            node = int(np.argmax(level.shapes[-1]))
+            node = int(np.argmax(level.gap.shapes[-1]))
             part, more_errors = _press_gaps(level, moved, pressed.active)
             errors = more_errors | errors
             shift = compute_step_weight_shift(pressed, node)
@@ -546,7 +532,7 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
     positions = HolderPositions(
         states.approach, cases.rotation + states.turn, states.turn, cases.holders.can_rotate
     )
-    gap = cases.amplitudes @ level.shapes
+    gap = cases.amplitudes @ level.gap.shapes
     return PressedCases(level, states.force, states.gap, gap, positions, layer), states.errors
 
 
@@ -561,11 +547,11 @@ def make_contact_force_function(patch_model, pair: CondensedPair):
     PatchfemError
         If a profile does not fit the mesh.
     """
-    x = pair.compliance.interface.x
-    gap = patch_model.gap.evaluate(x).heights + pair.end_gap
-    level = Level(patch_model, pair, np.zeros((0, x.size)))
+    level = make_level(patch_model, pair)
     pieces = level.pieces
-    holder = make_cases(patch_model, 1).holders.take(0)
+    cases = make_cases(patch_model, 1)
+    gap = cases.amplitudes[0] @ level.gap.shapes
+    holder = cases.holders.take(0)
     law = level.smooth_layer and level.smooth_layer.make_law(holder.load)
     active = None
 
