@@ -44,7 +44,7 @@ from .curves import (
     note_end_of_curve,
     sample_adaptively,
 )
-from .peaks import measure_peak_width, solve_peak
+from .peaks import find_vertex, measure_peak_width, solve_peak
 
 N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
 
@@ -66,6 +66,11 @@ LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
 SIDE_POINT_FRACTION = 0.1
 # Smallest distance of further points from each other, relative to the larger width
 MIN_SPACING_IN_WIDTHS = 0.9
+# Height of the balance from which on a frequency is examined, relative to the highest steady motion; for the damper of the
+# template the balance misses the height by up to 3 %
+MIN_HEIGHT_RATIO = 0.96
+# Height of the balance between two maxima, relative to the lower one, below which both are examined
+MAX_VALLEY_RATIO = 0.995
 
 
 class ShootingFinder:
@@ -504,49 +509,57 @@ class ShootingFinder:
         """
         if not self.odd_laws or self._max_growth_rate >= 0:
             return []
-        omega = 2 * np.pi * np.sort(choose_start_frequencies(self.modes, drive))
-        balanced = harmonic_balance.balance_first_harmonic(
-            self.modes, self.joints.laws, drive.acceleration, omega
+        balance = harmonic_balance.HarmonicBalance(
+            self.modes, self.joints.laws, drive.acceleration, self.modes.displacement_point
         )
-        heights = np.abs(balanced.modes @ self.modes.displacement_point)
-
-        # The highest maxima come first, and end where none is high enough beside the motions that were found.
-        padded = np.pad(heights, 1)
-        maxima = np.flatnonzero((heights >= padded[:-2]) & (heights >= padded[2:]))
+        balanced = balance.find_curve(
+            2 * np.pi * np.sort(choose_start_frequencies(self.modes, drive))
+        )
+        known = np.isfinite(balanced.heights)
+        if not known.any():
+            return []
         points: list[CurvePoint] = []
-        for k in maxima[np.argsort(-heights[maxima])]:
-            highest = max((point.values[AMPLITUDE] for point in points), default=0.0)
-            if heights[k] < harmonic_balance.MIN_HEIGHT_RATIO * highest:
-                break
-            # Of two points at one frequency, no peak could be interpolated
-            if omega[k] in [point.drive.omega for point in points]:
-                continue
-            sine = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
-            start = periodic.Start(balanced.make_start(self.make_case(sine)))
-            top = self.compute_curve_point(sine, start, needs_stability=False)
 
-            # A point beside it in the range
-            points.append(top)
+        def add_point(omega: float) -> CurvePoint:
+            """Compute the point at a frequency [rad/s] from the balance there, and add it."""
+            sine = SineDrive(drive.acceleration, omega, drive.moving)
+            state = balance.find_near(omega, balanced).make_start(self.make_case(sine))
+            start = periodic.Start(state)
+            points.append(self.compute_curve_point(sine, start, needs_stability=False))
+            return points[-1]
+
+        # Each high maximum has a point at its vertex and one beside it. Between maxima the balance falls by more than it
+        # errs from one frequency to the next.
+        omega = balanced.omega[known]
+        heights = balanced.heights[known]
+        widths = [0.0]
+        for k in np.argsort(-heights):
+            highest = max((point.values[AMPLITUDE] for point in points), default=0.0)
+            if heights[k] < MIN_HEIGHT_RATIO * highest:
+                break
+            places = np.searchsorted(omega, [point.drive.omega for point in points])
+            spans = [slice(min(k, place), max(k, place) + 1) for place in places]
+            if any(heights[span].min() >= MAX_VALLEY_RATIO * heights[k] for span in spans):
+                continue
+            vertex = find_vertex(omega, heights, k)
+            top = add_point(float(omega[k] if vertex is None else vertex.position))
             sides = (slice(k, None), slice(k, None, -1))
-            spans = [np.abs(omega[side] - omega[k]) for side in sides]
-            widths = [measure_peak_width(heights[side], span) for side, span in zip(sides, spans)]
-            self.estimated_width = min(filter(None, widths))
+            sizes = [
+                measure_peak_width(heights[side], np.abs(omega[side] - omega[k])) for side in sides
+            ]
+            widths += sizes
+            self.estimated_width = min(filter(None, sizes))
             step = SIDE_POINT_FRACTION * self.estimated_width
-            beside = replace(sine, omega=sine.omega + (step if widths[0] else -step))
+            beside = replace(top.drive, omega=top.drive.omega + (step if sizes[0] else -step))
             points.append(self.compute_curve_point(beside, top.guess.start, needs_stability=False))
 
-            # Where the balance is too high, the highest motion may be in a part of the curve that it does not show. Points
-            # a width apart cover all frequencies at which it is high enough.
-            for side in sides:
-                for at, height in zip(omega[side], heights[side]):
-                    highest = max(point.values[AMPLITUDE] for point in points)
-                    if height < harmonic_balance.MIN_HEIGHT_RATIO * highest:
-                        break
-                    distances = [abs(point.drive.omega - at) for point in points]
-                    if min(distances) >= MIN_SPACING_IN_WIDTHS * max(widths):
-                        near = replace(sine, omega=float(at))
-                        start = periodic.Start(balanced.make_start(self.make_case(near)))
-                        points.append(self.compute_curve_point(near, start, needs_stability=False))
+        # Points a width apart cover all frequencies at which the balance is high enough or is not known.
+        for at, height in zip(balanced.omega, balanced.heights):
+            highest = max(point.values[AMPLITUDE] for point in points)
+            distance = min(abs(point.drive.omega - at) for point in points)
+            is_apart = distance >= MIN_SPACING_IN_WIDTHS * max(widths)
+            if is_apart and height >= MIN_HEIGHT_RATIO * highest:
+                add_point(float(at))
         return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
 
     def _follow_curve(self, drive) -> ResponseCurve:
