@@ -139,25 +139,14 @@ class HarmonicBalance:
 
     def _balance(self, omega, rig: _LinearRig, slides) -> BalancedMotions:
         """Balance all harmonics at frequencies (k,) [rad/s] from slides (k, i, h) [m]."""
-        n_faces, n_waves = slides.shape[1], WAVES.shape[1]
-        size = n_faces * n_waves
-        n_samples = PHASES.size
-        # Receptance of the interfaces, as a real matrix of the factors of sines and cosines
-        at_interfaces = np.zeros(
-            (omega.size, n_faces, 2, HARMONICS.size, n_faces, 2, HARMONICS.size)
-        )
-        values = (rig.rows @ rig.receptance).transpose(0, 2, 3, 1)
-        orders = np.arange(HARMONICS.size)
-        parts = ((values.real, -values.imag), (values.imag, values.real))
-        for row, columns in enumerate(parts):
-            for column, part in enumerate(columns):
-                at_interfaces[:, :, row, orders, :, column, orders] = np.moveaxis(part, 3, 0)
+        lengths, stiffness = zip(*map(_list_elements, self.laws))
+        counts = [own.size for own in lengths]
         driven = np.zeros(slides.shape, complex)
         driven[:, :, 0] = rig.driven @ rig.rows.T
-        lengths, stiffness = zip(*map(_list_elements, self.laws))
-        counts = np.array([own.size for own in lengths])
+        n_samples, n_waves = WAVES.shape
+        size = n_waves * len(self.laws)
         balance = Balance(
-            receptance=at_interfaces.reshape(omega.size, size, size),
+            receptance=_split_matrix(rig.rows @ rig.receptance),
             driven=_split(driven),
             waves=WAVES,
             elements=np.append(0, np.cumsum(counts)),
@@ -174,23 +163,39 @@ class HarmonicBalance:
             work=np.zeros((3, size)),
         )
         kernel_cache.load_compiled_module("event_driven.balance_kernels").balance_curve(balance)
-        slides, forces = (
-            parts[:, :, 0] + 1j * parts[:, :, 1]
-            for parts in (
-                values.reshape(omega.size, n_faces, 2, -1)
-                for values in (balance.slides, balance.forces)
-            )
-        )
-        motion = rig.find_modes(forces)
+
+        motion = rig.find_modes(_join(balance.forces))
         heights = np.abs(_sample(self.row @ motion)).max(axis=-1)
         heights[balance.is_balanced == 0] = np.inf
-        return BalancedMotions(omega, motion, slides, heights)
+        return BalancedMotions(omega, motion, _join(balance.slides), heights)
 
 
 def _split(harmonics) -> np.ndarray:
     """Return the real and the imaginary parts (k, i 2 h) of the harmonics (k, i, h) of each interface in a row."""
     parts = np.concatenate([harmonics.real, harmonics.imag], axis=2)
     return parts.reshape(len(harmonics), -1)
+
+
+def _join(parts) -> np.ndarray:
+    """Return the harmonics (k, i, h) of the real and the imaginary parts (k, i 2 h) of `_split`."""
+    real, imaginary = np.moveaxis(parts.reshape(len(parts), -1, 2, HARMONICS.size), 2, 0)
+    return real + 1j * imaginary
+
+
+def _split_matrix(receptance) -> np.ndarray:
+    """Return the real matrices (k, i 2 h, i 2 h) that multiply parts as receptances (k, h, i, i) multiply harmonics."""
+    n_omega, n_harmonics, n_faces = receptance.shape[:3]
+    matrix = np.zeros((n_omega, n_faces, 2, n_harmonics, n_faces, 2, n_harmonics))
+    for k in range(n_harmonics):
+        own = receptance[:, k]
+        for row, column, part in (
+            (0, 0, own.real),
+            (0, 1, -own.imag),
+            (1, 0, own.imag),
+            (1, 1, own.real),
+        ):
+            matrix[:, :, row, k, :, column, k] = part
+    return matrix.reshape(n_omega, n_faces * 2 * n_harmonics, -1)
 
 
 def _list_elements(law: LawNumbers) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from .... import kernel_cache
 from ....core import NotConverged, Outcome, PatchfemError, SineDrive, max_abs
-from ....event_driven import cases, harmonic_balance, periodic
+from ....event_driven import cases, periodic
 from ....event_driven.laws import is_rigid, masing
 from ....event_driven.periodic_curves import (
     MotionCurve,
@@ -44,7 +44,8 @@ from .curves import (
     note_end_of_curve,
     sample_adaptively,
 )
-from .peaks import find_vertex, measure_peak_width, solve_peak
+from .estimates import PeakEstimate
+from .peaks import solve_peak
 
 N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
 
@@ -62,15 +63,6 @@ FREQUENCY_PATH = PathSettings(first_step=0.0125, max_step=0.05)
 WEAK_DRIVE = 1e-2
 MAX_LEVEL_RATIO = 10.0
 LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
-# Distance of a point beside the estimate of a peak, relative to its smaller width at 0.9 of its height
-SIDE_POINT_FRACTION = 0.1
-# Smallest distance of further points from each other, relative to the larger width
-MIN_SPACING_IN_WIDTHS = 0.9
-# Height of the balance from which on a frequency is examined, relative to the highest steady motion; for the damper of the
-# template the balance misses the height by up to 3 %
-MIN_HEIGHT_RATIO = 0.96
-# Height of the balance between two maxima, relative to the lower one, below which both are examined
-MAX_VALLEY_RATIO = 0.995
 
 
 class ShootingFinder:
@@ -498,69 +490,14 @@ class ShootingFinder:
         return ResponseCurve([point for _, point in samples])
 
     def _estimate_peaks(self, drive) -> list[CurvePoint]:
-        """Return a few points near each high maximum of a response curve, in order; [] if the peaks cannot be estimated.
-
-        The maxima of the first-harmonic balance are the guesses.
-
-        Parameters
-        ----------
-        drive : SweepDrive
-            Its amplitude and its range of frequencies.
-        """
+        """Return a few points near the high maxima of a response curve; [] if its harmonics are not balanced."""
         if not self.odd_laws or self._max_growth_rate >= 0:
             return []
-        balance = harmonic_balance.HarmonicBalance(
-            self.modes, self.joints.laws, drive.acceleration, self.modes.displacement_point
-        )
-        balanced = balance.find_curve(
-            2 * np.pi * np.sort(choose_start_frequencies(self.modes, drive))
-        )
-        known = np.isfinite(balanced.heights)
-        if not known.any():
-            return []
-        points: list[CurvePoint] = []
-
-        def add_point(omega: float) -> CurvePoint:
-            """Compute the point at a frequency [rad/s] from the balance there, and add it."""
-            sine = SineDrive(drive.acceleration, omega, drive.moving)
-            state = balance.find_near(omega, balanced).make_start(self.make_case(sine))
-            start = periodic.Start(state)
-            points.append(self.compute_curve_point(sine, start, needs_stability=False))
-            return points[-1]
-
-        # Each high maximum has a point at its vertex and one beside it. Between maxima the balance falls by more than it
-        # errs from one frequency to the next.
-        omega = balanced.omega[known]
-        heights = balanced.heights[known]
-        widths = [0.0]
-        for k in np.argsort(-heights):
-            highest = max((point.values[AMPLITUDE] for point in points), default=0.0)
-            if heights[k] < MIN_HEIGHT_RATIO * highest:
-                break
-            places = np.searchsorted(omega, [point.drive.omega for point in points])
-            spans = [slice(min(k, place), max(k, place) + 1) for place in places]
-            if any(heights[span].min() >= MAX_VALLEY_RATIO * heights[k] for span in spans):
-                continue
-            vertex = find_vertex(omega, heights, k)
-            top = add_point(float(omega[k] if vertex is None else vertex.position))
-            sides = (slice(k, None), slice(k, None, -1))
-            sizes = [
-                measure_peak_width(heights[side], np.abs(omega[side] - omega[k])) for side in sides
-            ]
-            widths += sizes
-            self.estimated_width = min(filter(None, sizes))
-            step = SIDE_POINT_FRACTION * self.estimated_width
-            beside = replace(top.drive, omega=top.drive.omega + (step if sizes[0] else -step))
-            points.append(self.compute_curve_point(beside, top.guess.start, needs_stability=False))
-
-        # Points a width apart cover all frequencies at which the balance is high enough or is not known.
-        for at, height in zip(balanced.omega, balanced.heights):
-            highest = max(point.values[AMPLITUDE] for point in points)
-            distance = min(abs(point.drive.omega - at) for point in points)
-            is_apart = distance >= MIN_SPACING_IN_WIDTHS * max(widths)
-            if is_apart and height >= MIN_HEIGHT_RATIO * highest:
-                add_point(float(at))
-        return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
+        omega = 2 * np.pi * np.sort(choose_start_frequencies(self.modes, drive))
+        estimate = PeakEstimate(self, drive, omega)
+        points = estimate.find_points()
+        self.estimated_width = estimate.width
+        return points
 
     def _follow_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation along its arc length, through its folds."""
