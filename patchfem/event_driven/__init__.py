@@ -28,11 +28,12 @@ A module imports its own entry of this list and the entries before it:
 11. `measures`        measures of the window, energies
 12. `stored_energy`   energy of stretched springs, bonds and a lifted load
 13. `runs`            runs with errors and histories
-14. `harmonic_balance` balance of the first harmonic of a driven rig
-15. `periodic`        periodic motions by shooting
-16. `periodic_curves` periodic motions under further conditions, and their curves through folds
-17. `quasi_static`    quasi-static motions of a mode
-18. `free_motions`    motions without a drive: backbones and limit cycles
+14. `balance_kernels` balance of odd harmonics by Newton's method
+15. `harmonic_balance` balance of the odd harmonics of a driven rig
+16. `periodic`        periodic motions by shooting
+17. `periodic_curves` periodic motions under further conditions, and their curves through folds
+18. `quasi_static`    quasi-static motions of a mode
+19. `free_motions`    motions without a drive: backbones and limit cycles
 
 Limits. The method is explicit: a law or mode that is 1e4 times faster than the drive takes as many more steps, and a
 run ends with a message after `cases.MAX_STEPS`. Margins are evaluated at three points of a step and at nearly

@@ -1,67 +1,103 @@
-"""Balance of the first harmonic of a driven rig, an estimate from which periodic motions are found.
+"""Balance of the odd harmonics of a driven rig, an estimate from which periodic motions are found.
 
-With slides u = Im(U exp(i omega t)) the friction of parallel elements has the first harmonic K U, where K follows from
-Masing's rules and |U|. The motion of the modes is then that of a linear rig, and |U| is found by successive substitution.
+With slides u = Im(sum of U_h exp(i h omega t)) over odd h, the friction of parallel elements has harmonics F_h, and the
+modes move as those of a linear rig under drive and friction. Newton's method balances them, with the friction of the
+elements at samples of half a period (alternating frequency-time method: Cameron and Griffin, J. Appl. Mech. 56, 149, 1989).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from .. import kernel_cache
 from ..core import ModalBasis
 from ..structure.response import compute_receptance
 from .cases import Case, Load, make_arrays
 from .laws import LAWS, masing
-from .records import Face, LawNumbers, Memory, Setting, State
+from .records import Balance, Face, LawNumbers, Memory, Setting, State
 
-N_NODES = 48  # nodes of Gauss's rule over a branch of a loop, which is exact while no element slips
-N_AMPLITUDES = 200  # amplitudes of the table of a law, evenly in the logarithm
-# Height of the first-harmonic balance from which on a frequency is examined, relative to the highest steady motion. For the
-# damper of the template, whose second mode answers to the third harmonic, the balance exceeds the motion by up to 150 %
-# and falls short of it by 20 %.
-MIN_HEIGHT_RATIO = 0.7
+N_SMOOTH_ELEMENTS = 12  # elements in place of a smooth curve of first loading
+HARMONICS = np.array([1, 3, 5, 7, 9])  # harmonics that are balanced
+# Samples of half a period, over which odd harmonics are orthogonal
+PHASES = np.arange(64) * np.pi / 64
+WAVES = np.hstack([np.sin(np.outer(PHASES, HARMONICS)), np.cos(np.outer(PHASES, HARMONICS))])
 
 
 class BalancedMotions(NamedTuple):
-    """First harmonics of the motions of a rig at k frequencies, as complex amplitudes.
+    """Odd harmonics of the motions of a rig at k frequencies, as complex amplitudes.
 
     - omega: (k,) increasing circular frequencies [rad/s]
-    - modes: (k, n) modal coordinates [m]
-    - slides: (k, i) relative displacements of the interfaces [m]
+    - modes: (k, n, h) modal coordinates [m]
+    - slides: (k, i, h) relative displacements of the interfaces [m]
+    - heights: (k,) half the ranges of the motion at a point [m]; inf where the harmonics are not balanced
     """
 
     omega: np.ndarray
     modes: np.ndarray
     slides: np.ndarray
+    heights: np.ndarray
 
     def make_start(self, case: Case) -> State:
-        """Return the state at the start of a period of a case, interpolated to its frequency.
+        """Return the state at the start of a period of a case at the first frequency.
 
         Elements remember the loop between both reversals of the slide.
         """
         state = make_arrays(case)[0]
-        n = self.modes.shape[1]
-        omega = case.rig.settings[Setting.OMEGA]
-        modes, slides = (
-            np.array([np.interp(omega, self.omega, column) for column in table.T])
-            for table in (self.modes, self.slides)
-        )
-        state.y[:n] = modes.imag
-        state.y[n : 2 * n] = omega * modes.real
-        for face, memory, slide in zip(case.rig.faces, state.memory, slides):
+        modes = self.modes[0]
+        n = len(modes)
+        state.y[:n] = modes.sum(axis=1).imag
+        state.y[n : 2 * n] = case.rig.settings[Setting.OMEGA] * (modes.real @ HARMONICS)
+        samples = _sample(self.slides[0])
+        speeds = self.slides[0].real @ HARMONICS
+        for face, memory, slide, speed in zip(case.rig.faces, state.memory, samples, speeds):
             if LAWS[int(face[Face.LAW])] != "masing":
                 continue
             memory[Memory.COUNT] = 0
-            memory[Memory.DIRECTION] = 1.0 if slide.real >= 0 else -1.0
-            ends = (-abs(slide), abs(slide))
-            masing.remember_loop(face[Face.NUMBERS :], memory, ends, slide.imag)
+            memory[Memory.DIRECTION] = 1.0 if speed >= 0 else -1.0
+            ends = np.array([-1.0, 1.0]) * np.abs(slide).max()
+            masing.remember_loop(face[Face.NUMBERS :], memory, ends, slide[0])
         return state
 
 
-def balance_first_harmonic(
-    modes: ModalBasis, joints, acceleration: float, omega
-) -> BalancedMotions:
-    """Balance the first harmonic of the motions of a rig whose interfaces have constant loads.
+def _sample(harmonics) -> np.ndarray:
+    """Return the values (..., s) at the samples of half a period from complex amplitudes (..., h)."""
+    return np.concatenate([harmonics.real, harmonics.imag], axis=-1) @ WAVES.T
+
+
+class _LinearRig(NamedTuple):
+    """Rig without friction at k frequencies and their harmonics.
+
+    - receptance: (k, h, n, i) modal coordinates per force at the interfaces [m/N]
+    - driven: (k, n) modal coordinates under the drive, in the first harmonic [m]
+    - rows: (i, n) slides per modal coordinate
+    """
+
+    receptance: np.ndarray
+    driven: np.ndarray
+    rows: np.ndarray
+
+    def find_modes(self, forces) -> np.ndarray:
+        """Return the modal coordinates (k, n, h) [m] under the drive and friction forces (k, i, h) [N]."""
+        motion = -np.einsum("khni,kih->knh", self.receptance, forces)
+        motion[:, :, 0] += self.driven
+        return motion
+
+    def select(self, places) -> "_LinearRig":
+        """Return the rig at some of its frequencies, from their indices."""
+        return self._replace(receptance=self.receptance[places], driven=self.driven[places])
+
+
+def _make_linear_rig(modes: ModalBasis, omega, acceleration: float) -> _LinearRig:
+    """Return a rig without friction under a drive of an amplitude [m s-2] at frequencies (k,) [rad/s]."""
+    forces = np.vstack([modes.interfaces, -modes.mass * acceleration * modes.base])
+    n = modes.omega.size
+    receptance = compute_receptance(modes, np.outer(omega, HARMONICS).ravel(), np.eye(n), forces)
+    receptance = receptance.reshape(omega.size, HARMONICS.size, n, len(forces))
+    return _LinearRig(receptance[..., :-1], receptance[:, 0, :, -1], modes.interfaces)
+
+
+class HarmonicBalance:
+    """Balance of the odd harmonics of the motions of a rig whose interfaces have constant loads.
 
     Parameters
     ----------
@@ -71,39 +107,108 @@ def balance_first_harmonic(
         (i,) laws of parallel elements or of rigid friction, and loads. Rigid friction counts as a stiff element.
     acceleration : float
         Amplitude of the drive [m s-2].
-    omega : (k,) array
-        Circular frequencies [rad/s].
-
-    Returns
-    -------
-    BalancedMotions
-        The last substitution, whether it has converged or not.
+    row : (n,) array
+        Participations of the modes in the motion of the point whose heights are wanted.
     """
-    rows = modes.interfaces
-    n = modes.omega.size
-    n_laws = len(joints)
-    forces = np.vstack([rows, -modes.mass * acceleration * modes.base])
-    receptance = compute_receptance(modes, omega, np.eye(n), forces)
-    at_interfaces = rows @ receptance
-    largest = np.abs(at_interfaces[:, :, n_laws]).max(axis=0)
-    laws = [_soften(*joint, size) for joint, size in zip(joints, largest)]
-    tables = [_tabulate_stiffness(law, size) for law, size in zip(laws, largest)]
 
-    # U = (I + G K)^-1 d with the receptance G of the interfaces and the slides d without friction
-    stiffness = np.tile([law.stiffness + 0j for law in laws], (len(omega), 1))
-    # Substitutions of the stiffness, each by half of its change
-    for _ in range(60):
-        matrix = np.eye(n_laws) + at_interfaces[:, :, :n_laws] * stiffness[:, None]
-        slides = np.linalg.solve(matrix, at_interfaces[:, :, n_laws:])[:, :, 0]
-        change = -stiffness
-        for i, table in enumerate(tables):
-            change[:, i] += table.find_stiffness(np.abs(slides[:, i]))
-        stiffness += 0.5 * change
-        # Relative change of all stiffnesses at which the substitutions end
-        if np.abs(change).max() <= 1e-3 * np.abs(stiffness).max():
-            break
-    loads = np.column_stack([-stiffness * slides, np.ones(len(omega))])
-    return BalancedMotions(omega, (receptance @ loads[:, :, None])[:, :, 0], slides)
+    def __init__(self, modes: ModalBasis, joints, acceleration: float, row):
+        self.modes = modes
+        self.joints = joints
+        self.acceleration = acceleration
+        self.row = row
+
+    def find_curve(self, omega) -> BalancedMotions:
+        """Return the motions at increasing frequencies (k,) [rad/s], which are found from those of sticking interfaces."""
+        rig = _make_linear_rig(self.modes, omega, self.acceleration)
+        largest = np.abs(rig.driven @ rig.rows.T).max(axis=0)
+        self.laws = [_soften(*joint, size) for joint, size in zip(self.joints, largest)]
+        slides = np.zeros((omega.size, len(self.laws), HARMONICS.size), complex)
+        stiffness = np.diag([law.stiffness for law in self.laws])
+        matrix = np.eye(len(self.laws)) + rig.rows @ rig.receptance[:, 0] @ stiffness
+        driven = (rig.driven @ rig.rows.T)[:, :, None]
+        slides[:, :, 0] = np.linalg.solve(matrix, driven)[:, :, 0]
+        return self._balance(omega, rig, slides)
+
+    def find_near(self, omega: float, near: BalancedMotions) -> BalancedMotions:
+        """Return the motion at a frequency [rad/s], which is found from others."""
+        rig = _make_linear_rig(self.modes, np.array([omega]), self.acceleration)
+        slides = np.empty((1, *near.slides.shape[1:]), complex)
+        for place in np.ndindex(slides.shape[1:]):
+            slides[(0, *place)] = np.interp(omega, near.omega, near.slides[(..., *place)])
+        return self._balance(np.array([omega]), rig, slides)
+
+    def _balance(self, omega, rig: _LinearRig, slides) -> BalancedMotions:
+        """Balance all harmonics at frequencies (k,) [rad/s] from slides (k, i, h) [m]."""
+        lengths, stiffness = zip(*map(_list_elements, self.laws))
+        counts = [own.size for own in lengths]
+        driven = np.zeros(slides.shape, complex)
+        driven[:, :, 0] = rig.driven @ rig.rows.T
+        n_samples, n_waves = WAVES.shape
+        size = n_waves * len(self.laws)
+        balance = Balance(
+            receptance=_split_matrix(rig.rows @ rig.receptance),
+            driven=_split(driven),
+            waves=WAVES,
+            elements=np.append(0, np.cumsum(counts)),
+            lengths=np.concatenate(lengths),
+            stiffness=np.concatenate(stiffness),
+            slides=_split(slides),
+            is_balanced=np.zeros(omega.size),
+            path=np.zeros(n_samples),
+            friction=np.zeros(n_samples),
+            follows=np.zeros((n_samples, n_waves)),
+            forces=np.zeros((omega.size, size)),
+            slopes=np.zeros((n_waves, size)),
+            matrix=np.zeros((size, size + 1)),
+            work=np.zeros((3, size)),
+        )
+        kernel_cache.load_compiled_module("event_driven.balance_kernels").balance_curve(balance)
+
+        motion = rig.find_modes(_join(balance.forces))
+        heights = np.abs(_sample(self.row @ motion)).max(axis=-1)
+        heights[balance.is_balanced == 0] = np.inf
+        return BalancedMotions(omega, motion, _join(balance.slides), heights)
+
+
+def _split(harmonics) -> np.ndarray:
+    """Return the real and the imaginary parts (k, i 2 h) of the harmonics (k, i, h) of each interface in a row."""
+    parts = np.concatenate([harmonics.real, harmonics.imag], axis=2)
+    return parts.reshape(len(harmonics), -1)
+
+
+def _join(parts) -> np.ndarray:
+    """Return the harmonics (k, i, h) of the real and the imaginary parts (k, i 2 h) of `_split`."""
+    real, imaginary = np.moveaxis(parts.reshape(len(parts), -1, 2, HARMONICS.size), 2, 0)
+    return real + 1j * imaginary
+
+
+def _split_matrix(receptance) -> np.ndarray:
+    """Return the real matrices (k, i 2 h, i 2 h) that multiply parts as receptances (k, h, i, i) multiply harmonics."""
+    n_omega, n_harmonics, n_faces = receptance.shape[:3]
+    matrix = np.zeros((n_omega, n_faces, 2, n_harmonics, n_faces, 2, n_harmonics))
+    for k in range(n_harmonics):
+        own = receptance[:, k]
+        for row, column, part in (
+            (0, 0, own.real),
+            (0, 1, -own.imag),
+            (1, 0, own.imag),
+            (1, 1, own.real),
+        ):
+            matrix[:, :, row, k, :, column, k] = part
+    return matrix.reshape(n_omega, n_faces * 2 * n_harmonics, -1)
+
+
+def _list_elements(law: LawNumbers) -> tuple[np.ndarray, np.ndarray]:
+    """Return the largest stretch [m] and the stiffness [N/m] (e,) of the elements of a law of `masing`.
+
+    A smooth curve of first loading has N_SMOOTH_ELEMENTS in its place.
+    """
+    if not masing.has_power_law(law):
+        return masing.list_elements(law)[::-1]
+    # Points of the curve, which is most bent at its start
+    points = law.numbers[3] * np.linspace(0.0, 1.0, N_SMOOTH_ELEMENTS + 1) ** 2
+    slopes = np.diff(masing.load_first(np.array(law.numbers), points)) / np.diff(points)
+    return points[1:], -np.diff(np.append(slopes, 0.0))
 
 
 def _soften(law: LawNumbers, load: Load, largest: float) -> LawNumbers:
@@ -113,39 +218,3 @@ def _soften(law: LawNumbers, load: Load, largest: float) -> LawNumbers:
     # Stretch of the element that stands for rigid friction, relative to the slide without friction
     length = 1e-2 * largest
     return masing.from_elements([law.numbers[1] * load.mean / length], [length])
-
-
-class _StiffnessTable(NamedTuple):
-    """First harmonic of a friction force over the amplitude of the slide.
-
-    - amplitudes: (a,) increasing amplitudes [m]
-    - moments: (a,) complex force times amplitude [N m], whose imaginary part is the loss per cycle over pi
-    - at_rest: tangent stiffness at rest [N/m]
-    """
-
-    amplitudes: np.ndarray
-    moments: np.ndarray
-    at_rest: float
-
-    def find_stiffness(self, amplitude) -> np.ndarray:
-        """Return the complex stiffness (k,) [N/m] at amplitudes (k,) [m]."""
-        moments = np.interp(amplitude, self.amplitudes, self.moments)
-        square = np.maximum(amplitude, self.amplitudes[0]) ** 2
-        return np.where(amplitude < self.amplitudes[0], self.at_rest, moments / square)
-
-
-def _tabulate_stiffness(law: LawNumbers, largest: float) -> _StiffnessTable:
-    """Return the first harmonic of the force of a law up to an amplitude [m] that no slide exceeds by much.
-
-    From the reversal at the amplitude u the force is F(u) - 2 F(x), where F is that of first loading and x half of the way.
-    """
-    numbers = np.array(law.numbers)
-    last = max(2 * largest, 10 * law.length)
-    # Smallest amplitude of this table, relative to the stretch before slip
-    amplitudes = np.geomspace(1e-2 * law.length, last, N_AMPLITUDES)
-    nodes, weights = np.polynomial.legendre.leggauss(N_NODES)
-    angle = (nodes + 1) * np.pi / 2
-    way = amplitudes[:, None] * np.sin(angle / 2) ** 2
-    branch = masing.load_first(numbers, way) @ (weights * np.exp(-1j * angle))
-    force = -4j / np.pi * masing.load_first(numbers, amplitudes) - 2 * branch
-    return _StiffnessTable(amplitudes, force * amplitudes, law.stiffness)

@@ -178,6 +178,14 @@ def _search(
         multipliers, error = shooting.check(before, tolerance)
     else:
         multipliers, error = shooting.find_multipliers(before)
+        # Other differences do not pass the same kink of a law.
+        for factor in (-1.0, 30.0, -1.0):
+            if np.abs(multipliers).max(initial=0.0) < MAX_STABLE_MULTIPLIER:
+                break
+            shooting.difference *= factor
+            shooting.map = None
+            found = [(multipliers, error), shooting.find_multipliers(before)]
+            multipliers, error = min(found, key=lambda pair: np.abs(pair[0]).max())
 
     # Near the periodic motion one more correction costs a period, because the derivatives are known.
     if not has_kinks and change < tolerance and error > change:

@@ -448,3 +448,40 @@ class LawNumbers(NamedTuple):
     scales: tuple[float, ...] = ()
     length: float = np.inf
     stiffness: float = 0.0
+
+
+class Balance(NamedTuple):
+    """Balance of odd harmonics at k frequencies.
+
+    The n unknowns are, for each interface, the factors of the sines of its slide and those of its cosines.
+
+    - receptance: (k, n, n) slides per friction force, with the factors of sines and cosines
+    - driven: (k, n) slides without friction [m]
+    - waves: (s, w) the w sines and cosines at the samples of half a period
+    - elements: (i + 1,) first element of each interface, and their number
+    - lengths, stiffness: (e,) largest stretch [m] and stiffness [N/m] of the elements
+    - slides: (k, n) motions at which the search begins, then those that are balanced [m]
+    - is_balanced: (k,) 1.0 where a motion is balanced, else 0.0
+    - path, friction: (s,) slide [m] and friction [N] of an interface at the samples
+    - follows: (s, w) derivatives of the friction by the slide [N/m]
+    - forces: (k, n) friction of the motions [N]
+    - slopes: (w, n) derivatives of the friction of each interface by its own slide [N/m]
+    - matrix: (n, n + 1) equations of a Newton step
+    - work: (3, n) trial, best motion and step of a search [m]
+    """
+
+    receptance: np.ndarray
+    driven: np.ndarray
+    waves: np.ndarray
+    elements: np.ndarray
+    lengths: np.ndarray
+    stiffness: np.ndarray
+    slides: np.ndarray
+    is_balanced: np.ndarray
+    path: np.ndarray
+    friction: np.ndarray
+    follows: np.ndarray
+    forces: np.ndarray
+    slopes: np.ndarray
+    matrix: np.ndarray
+    work: np.ndarray

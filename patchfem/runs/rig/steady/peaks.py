@@ -161,7 +161,7 @@ class CurveInProgress:
             Fraction of the width [1].
         """
         k = self.positions.index(place)
-        last = _Vertex(np.inf, 0.0)
+        last = Vertex(np.inf, 0.0)
         last_shift = np.inf
         for _ in range(MAX_ADDED_POINTS):
             # The highest point and its neighbours, of which the one that is farther away is approached
@@ -172,7 +172,7 @@ class CurveInProgress:
             added = self._find_place_outside(k)
             if added is None:
                 added = (top + farther) / 2
-                vertex = _find_vertex(np.array(self.positions), self.find_heights(), k)
+                vertex = find_vertex(np.array(self.positions), self.find_heights(), k)
                 distance = tolerance * (vertex.width if vertex else abs(farther - top))
                 if abs(farther - top) <= 1.5 * distance or top == farther:
                     return self.find_widest_shift(k)
@@ -242,7 +242,7 @@ class CurveInProgress:
                 0.5 * rise / abs(step) * width**2 / (WIDTH_HEIGHT_FRACTION**-2 - 1) - abs(step) / 2
             )
             # Longest step beyond the highest point at an end of a curve, in widths of a peak
-            length = min(max(length, abs(step)), 2.0 * max(width, abs(step)))
+            length = min(max(length, 2.0 * abs(step)), 2.0 * max(width, abs(step)))
             return float(np.clip(self.positions[k] + np.copysign(length, step), *self.ends))
         return None
 
@@ -257,14 +257,14 @@ class CurveInProgress:
         self.positions.insert(place, position)
 
 
-class _Vertex(NamedTuple):
+class Vertex(NamedTuple):
     """Vertex of a peak: its position, and the distance at which the curve has fallen to WIDTH_HEIGHT_FRACTION."""
 
     position: float
     width: float
 
 
-def _find_vertex(x, y, k: int) -> _Vertex | None:
+def find_vertex(x, y, k: int) -> Vertex | None:
     """Return the vertex near the highest of several values y, by the polynomial through their inverse squares.
 
     A parabola is exact for a linear resonance. The polynomial goes through the N_VERTEX_POINTS points nearest to the
@@ -304,7 +304,7 @@ def _find_vertex(x, y, k: int) -> _Vertex | None:
     if not bend > 0:
         return None
     width = scale * np.sqrt((WIDTH_HEIGHT_FRACTION**-2 - 1) / bend)
-    return _Vertex(float(x[k] + scale * place), float(width))
+    return Vertex(float(x[k] + scale * place), float(width))
 
 
 def measure_peak_width(y, distances) -> float:

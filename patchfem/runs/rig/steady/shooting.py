@@ -14,7 +14,7 @@ import numpy as np
 
 from .... import kernel_cache
 from ....core import NotConverged, Outcome, PatchfemError, SineDrive, max_abs
-from ....event_driven import cases, harmonic_balance, periodic
+from ....event_driven import cases, periodic
 from ....event_driven.laws import is_rigid, masing
 from ....event_driven.periodic_curves import (
     MotionCurve,
@@ -44,7 +44,8 @@ from .curves import (
     note_end_of_curve,
     sample_adaptively,
 )
-from .peaks import measure_peak_width, solve_peak
+from .estimates import PeakEstimate
+from .peaks import solve_peak
 
 N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
 
@@ -62,10 +63,6 @@ FREQUENCY_PATH = PathSettings(first_step=0.0125, max_step=0.05)
 WEAK_DRIVE = 1e-2
 MAX_LEVEL_RATIO = 10.0
 LEVEL_PATH = PathSettings(first_step=0.005, max_step=0.05)
-# Distance of a point beside the estimate of a peak, relative to its smaller width at 0.9 of its height
-SIDE_POINT_FRACTION = 0.1
-# Smallest distance of further points from each other, relative to the larger width
-MIN_SPACING_IN_WIDTHS = 0.9
 
 
 class ShootingFinder:
@@ -493,61 +490,14 @@ class ShootingFinder:
         return ResponseCurve([point for _, point in samples])
 
     def _estimate_peaks(self, drive) -> list[CurvePoint]:
-        """Return a few points near each high maximum of a response curve, in order; [] if the peaks cannot be estimated.
-
-        The maxima of the first-harmonic balance are the guesses.
-
-        Parameters
-        ----------
-        drive : SweepDrive
-            Its amplitude and its range of frequencies.
-        """
+        """Return a few points near the high maxima of a response curve; [] if its harmonics are not balanced."""
         if not self.odd_laws or self._max_growth_rate >= 0:
             return []
         omega = 2 * np.pi * np.sort(choose_start_frequencies(self.modes, drive))
-        balanced = harmonic_balance.balance_first_harmonic(
-            self.modes, self.joints.laws, drive.acceleration, omega
-        )
-        heights = np.abs(balanced.modes @ self.modes.displacement_point)
-
-        # The highest maxima come first, and end where none is high enough beside the motions that were found.
-        padded = np.pad(heights, 1)
-        maxima = np.flatnonzero((heights >= padded[:-2]) & (heights >= padded[2:]))
-        points: list[CurvePoint] = []
-        for k in maxima[np.argsort(-heights[maxima])]:
-            highest = max((point.values[AMPLITUDE] for point in points), default=0.0)
-            if heights[k] < harmonic_balance.MIN_HEIGHT_RATIO * highest:
-                break
-            # Of two points at one frequency, no peak could be interpolated
-            if omega[k] in [point.drive.omega for point in points]:
-                continue
-            sine = SineDrive(drive.acceleration, float(omega[k]), drive.moving)
-            start = periodic.Start(balanced.make_start(self.make_case(sine)))
-            top = self.compute_curve_point(sine, start, needs_stability=False)
-
-            # A point beside it in the range
-            points.append(top)
-            sides = (slice(k, None), slice(k, None, -1))
-            spans = [np.abs(omega[side] - omega[k]) for side in sides]
-            widths = [measure_peak_width(heights[side], span) for side, span in zip(sides, spans)]
-            self.estimated_width = min(filter(None, widths))
-            step = SIDE_POINT_FRACTION * self.estimated_width
-            beside = replace(sine, omega=sine.omega + (step if widths[0] else -step))
-            points.append(self.compute_curve_point(beside, top.guess.start, needs_stability=False))
-
-            # Where the balance is too high, the highest motion may be in a part of the curve that it does not show. Points
-            # a width apart cover all frequencies at which it is high enough.
-            for side in sides:
-                for at, height in zip(omega[side], heights[side]):
-                    highest = max(point.values[AMPLITUDE] for point in points)
-                    if height < harmonic_balance.MIN_HEIGHT_RATIO * highest:
-                        break
-                    distances = [abs(point.drive.omega - at) for point in points]
-                    if min(distances) >= MIN_SPACING_IN_WIDTHS * max(widths):
-                        near = replace(sine, omega=float(at))
-                        start = periodic.Start(balanced.make_start(self.make_case(near)))
-                        points.append(self.compute_curve_point(near, start, needs_stability=False))
-        return sorted(points, key=lambda point: point.drive.omega, reverse=drive.low > drive.high)
+        estimate = PeakEstimate(self, drive, omega)
+        points = estimate.find_points()
+        self.estimated_width = estimate.width
+        return points
 
     def _follow_curve(self, drive) -> ResponseCurve:
         """Compute the response curve over frequency by continuation along its arc length, through its folds."""

@@ -1,0 +1,181 @@
+"""Peaks of response curves of random rigs beside motions by brute force (`brute`), and beside their drawn curves.
+
+    python tests/support/curve_campaign.py OUT [CPU_SECONDS]
+
+Recipe: rig k of N_RIGS has the seed FIRST_SEED + k, a chain of 1 to 3 masses, and an interface to the ground at each of its
+1 to 3 last masses, with the laws in turn. Each sixth rig has a cubic spring, whose curve may have folds. The amplitude at
+the stated frequency of the peak is compared with that of the brute-force motion, whose own uncertainty is added to the
+error. A multiplier is compared with the decay of the difference of two brute-force motions, on which MULTIPLIER_TOL is
+allowed, because they have steps of order 1. A sweep's peak without a curve agrees with that of the run that draws it.
+"""
+
+import json
+import signal
+import sys
+import tomllib
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+from brute import systems
+from brute.gauss_seidel import march
+from brute.recipe import Sizes, write_law
+
+import patchfem as pf
+
+FIRST_SEED = 20302700
+N_RIGS = 60
+LAWS = ("elastic-plastic", "iwan", "tanh", "nonlocal", "bouc-wen", "lugre", "stiffness", "coulomb")
+N_CYCLES = 300  # cycles of the brute-force motions from rest
+N_STEPS = 800  # their steps per cycle
+MULTIPLIER_TOL = 0.02
+MAX_CPU_SECONDS = 60.0  # of a rig, after which it is left out
+AMPLITUDE = "relative_displacement_amplitude"
+
+
+def make_structure(seed: int) -> tuple[str, float, float]:
+    """Return the structure of a rig as text, its lowest frequency without friction [rad/s], and a drive [m/s2]."""
+    rng = np.random.default_rng(seed)
+    number = seed - FIRST_SEED
+    n = 1 + number % 3
+    n_faces = int(rng.integers(1, n + 1))
+    omega = 2 * np.pi * rng.uniform(60, 200)
+    masses = rng.uniform(0.5, 1.5, n)
+    springs = masses * omega**2 * rng.uniform(0.8, 2, n)
+    dampers = 2 * rng.uniform(0.01, 0.03, n) * np.sqrt(masses * springs)
+    text = f"[structure]\nmasses = {[f'{mass:.6g} kg' for mass in masses]}\n"
+    for k in range(n):
+        text += f"[[structure.spring]]\nbetween = [{k + 1}, {k}]\n"
+        text += f'stiffness = "{springs[k]:.6g} N/m"\n'
+        text += f"[[structure.damper]]\nbetween = [{k + 1}, {k}]\n"
+        text += f'coefficient = "{dampers[k]:.6g} N s/m"\n'
+
+    # Friction of about the drive force of a mass
+    rows = np.eye(n) - np.eye(n, k=-1)
+    stiffness = rows.T @ np.diag(springs) @ rows
+    lowest = float(np.sqrt(np.linalg.eigvals(np.diag(1 / masses) @ stiffness).real.min()))
+    acceleration = rng.uniform(5, 30)
+    for face in range(n_faces):
+        mass = n - face
+        static = rng.uniform(0.2, 0.5)
+        limit = rng.uniform(0.2, 1.0) * masses[mass - 1] * acceleration / n_faces
+        sizes = Sizes(limit, limit / static, static, lowest, acceleration / lowest**2, 0.01)
+        law = LAWS[(number + face) % len(LAWS)]
+        text += f"[[structure.interface]]\nbetween = [{mass}, 0]\n"
+        text += write_law(rng, law, sizes, has_patch=False)
+        text += f'load = "{limit / static:.6g} N"\n'
+    if number % 6 == 5:
+        cubic = rng.uniform(0.005, 0.05) * springs[0] * (lowest**2 / acceleration) ** 2
+        text += f'[structure.stiffening]\ncubic = "{cubic:.6g} N/m^3"\n'
+    return text, lowest, acceleration
+
+
+def make_sweep(seed: int) -> str:
+    """Return the scene of the response curve of a rig."""
+    text, omega, acceleration = make_structure(seed)
+    frequency = omega / (2 * np.pi)
+    return (
+        f'{text}[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "{acceleration:.6g} m/s^2"\n'
+        f'from = "{0.7 * frequency:.6g} Hz"\nto = "{1.9 * frequency:.6g} Hz"\nrate = "1 Hz/s"\n'
+        '[accuracy]\nmethod = "harmonic"\ntolerance = 1e-2\n'
+    )
+
+
+def make_sine(seed: int, frequency: float) -> str:
+    """Return the scene of a rig under a sine, for `brute`."""
+    text, _, acceleration = make_structure(seed)
+    return (
+        f'{text}[drive]\nkind = "base"\nacceleration = "{acceleration / 9.80665:.12g} g"\n'
+        f'frequency = "{frequency:.12g} Hz"\ncycles = {N_CYCLES}\n'
+    )
+
+
+def measure_multiplier(text: str) -> float:
+    """Return the ratio per cycle of the differences of two brute-force motions; nan where they vanish at once."""
+    n_steps = N_STEPS // 3
+    tables = tomllib.loads(text)
+    period = 1 / systems.read_number(tables["drive"]["frequency"])
+    time = period * np.arange(N_CYCLES * n_steps + 1) / n_steps
+    outputs = []
+    for factor in (0.0, 1e-3):
+        structure = systems.make_structure(tables, time)
+        points, loads = systems._make_points(tables, time)
+        state = np.zeros(2 * structure.rows.shape[1])
+        samples = np.zeros((time.size, 2 * structure.rows.shape[0] + 1))
+        size = np.abs(outputs[0][-n_steps:]).max() if outputs else 0.0
+        state[: state.size // 2] = factor * size
+        march(points, structure, loads, float(time[1]), state, samples)
+        outputs.append(samples[:, -1])
+    difference = np.abs(outputs[1] - outputs[0])[1:].reshape(N_CYCLES, n_steps).max(axis=1)
+    size = np.abs(outputs[0]).max()
+    # Late cycles, whose difference is well above round-off
+    used = np.flatnonzero(difference > 1e-9 * size)
+    used = used[used > 10][-40:]
+    if used.size < 8:
+        return np.nan
+    return float(np.exp(np.polyfit(used, np.log(difference[used]), 1)[0]))
+
+
+def examine(seed: int) -> dict:
+    """Return stated values of a rig beside its brute-force motion."""
+    text = make_sweep(seed)
+    row = {"seed": seed}
+    begin = process_time()
+    drawn = pf.run(text)
+    row["drawn_seconds"] = process_time() - begin
+    row["outcome"] = [str(drawn.outcome)]
+    stated = drawn.measures[AMPLITUDE]
+    frequency = drawn.measures["peak_frequency"]
+    if stated.value is None or frequency.value is None or stated.error is None:
+        return row
+    row["amplitude"] = [stated.value, stated.error]
+
+    # The peak of a sweep follows from the curve where the laws have no harmonic balance.
+    is_balanced = not any(f'"{law}"' in text for law in ("tanh", "nonlocal", "bouc-wen", "lugre"))
+    if is_balanced and "stiffening" not in text:
+        begin = process_time()
+        cases = pf.run_many(text)
+        row["sweep_seconds"] = process_time() - begin
+        row["outcome"].append(str(cases.outcome[0]))
+        row["sweep_amplitude"] = [
+            float(part[AMPLITUDE][0]) for part in (cases.values, cases.errors)
+        ]
+    row["frequency"] = [frequency.value, frequency.error]
+    steady = drawn.motion.steady
+    row["multiplier"] = float(np.abs(steady.multipliers).max(initial=0.0))
+    row["folds"] = [steady.curve[name].tolist() for name in ("folds", "fold_errors")]
+    sine = make_sine(seed, frequency.value)
+    reference = systems.find_reference(sine, N_STEPS)
+    row["brute"] = [reference.values[AMPLITUDE], reference.doubts[AMPLITUDE]]
+    row["brute_multiplier"] = measure_multiplier(sine)
+    return row
+
+
+def main(out: str, max_seconds: float = 1200.0) -> None:
+    """Examine the rigs that a file does not have yet, until the CPU seconds are spent."""
+    path = Path(out)
+    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    known = {row["seed"] for row in rows}
+
+    def stop(*_):
+        """End a rig that takes too long."""
+        raise TimeoutError
+
+    signal.signal(signal.SIGVTALRM, stop)
+    for seed in range(FIRST_SEED, FIRST_SEED + N_RIGS):
+        if seed in known:
+            continue
+        if process_time() > max_seconds:
+            break
+        signal.setitimer(signal.ITIMER_VIRTUAL, MAX_CPU_SECONDS)
+        try:
+            row = examine(seed)
+        except (pf.PatchfemError, TimeoutError) as error:
+            row = {"seed": seed, "message": f"{type(error).__name__}: {error}"}
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        with path.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], *map(float, sys.argv[2:]))
