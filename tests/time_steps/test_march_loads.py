@@ -14,6 +14,7 @@ from varying_load_cases import (
     LAWS,
     LOAD,
     MASS,
+    MIXED,
     STILL,
     crowned_contact,
     find_convergence,
@@ -200,3 +201,14 @@ def test_order_two_with_shear_modes():
     """With modes that combine slide, heave and pitch and a varying contact the march converges with order two."""
     found = find_convergence("bonds", 800, reduce_to_shear_modes(crowned_contact(), 8))
     assert found.order == pytest.approx(2, abs=0.45) and found.change <= 2e-3
+
+
+def test_acceleration_of_a_pressed_motion_is_the_derivative_of_its_velocity():
+    """The stated acceleration under a changing load and moment is the central difference of the velocity, within 0.1 %."""
+    drive = SineDrive(40.0, 2 * np.pi * 143)
+    response = march_pressed(MIXED, drive, crowned_contact(), "plastic", 1, 1600).response
+    velocity = response.modal_rate @ MIXED.output
+    differences = np.gradient(velocity, response.time)[1:-1]
+    stated = (response.acceleration - response.base_acceleration)[1:-1]
+    assert np.ptp(response.extra["normal_load"]) > 0.1 * LOAD
+    assert np.abs(stated - differences).max() <= 1e-3 * np.ptp(differences)
