@@ -10,7 +10,7 @@ from patchfem.export.sweeps.words import make_verdict
 
 @pytest.mark.parametrize("n_missing", range(6))
 def test_exact_missing_cases_are_counted_and_up_to_three_are_named(n_missing):
-    """Of n cases above the tolerance the count is stated, three values of the key are named, and the others are mentioned."""
+    """The number of cases above the tolerance is stated, three values of the key are named, and others are mentioned."""
     forces = np.arange(1.0, 9.0)
     errors = np.where(forces <= n_missing, 0.1, 1e-5)
     table = make_table(
