@@ -1,5 +1,7 @@
 """Properties of pressed pieces that hold for every gap: scaling, mirror, guides, and soft or stiff springs."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,16 +9,25 @@ from hypothesis import strategies as st
 from pieces import LOAD, make_coated_pair
 from pressed import press
 
-PAIR = make_coated_pair(40)
-X = PAIR.interface.x
-HALF = float(X[-1])
 # Heights [m] of a tilt, a crown and a wave.
 HEIGHTS = st.tuples(*3 * [st.floats(-2e-6, 2e-6)])
 
 
+@cache
+def make_pair():
+    """Return the coated pair of 40 columns."""
+    return make_coated_pair(40)
+
+
+def press_pair(gap, load=LOAD, moment=np.nan, spring=0.0):
+    """Press the coated pair."""
+    return press(make_pair(), gap, load, moment, spring=spring)
+
+
 def make_gap(heights) -> np.ndarray:
     """Return a gap with a tilt, a crown and a wave."""
-    s = X / HALF
+    x = make_pair().interface.x
+    s = x / x[-1]
     return heights[0] * s + heights[1] * s**2 + heights[2] * np.cos(7 * s + 1)
 
 
@@ -30,7 +41,7 @@ def is_close(found, expected) -> bool:
 def test_exact_gap_and_load_times_a_factor(heights, factor):
     """Pressure, approach and opening are homogeneous of degree 1 in gap and load: the pieces are linear."""
     gap = make_gap(heights)
-    once, more = press(PAIR, gap, LOAD), press(PAIR, factor * gap, factor * LOAD)
+    once, more = press_pair(gap, LOAD), press_pair(factor * gap, factor * LOAD)
     assert is_close(more.sigma_n, factor * once.sigma_n)
     assert more.approach == pytest.approx(factor * once.approach, rel=1e-8, abs=1e-16)
     assert np.abs(more.gap - factor * once.gap).max() <= 1e-8 * factor * (np.ptp(gap) + 1e-9)
@@ -40,7 +51,7 @@ def test_exact_gap_and_load_times_a_factor(heights, factor):
 def test_exact_mirrored_gap_has_the_mirrored_pressure(heights):
     """A gap that is mirrored has the mirrored pressure, and guided pieces turn neither way."""
     gap = make_gap(heights)
-    once, mirrored = press(PAIR, gap, LOAD), press(PAIR, gap[::-1], LOAD)
+    once, mirrored = press_pair(gap, LOAD), press_pair(gap[::-1], LOAD)
     assert is_close(mirrored.sigma_n, once.sigma_n[::-1])
     assert mirrored.approach == pytest.approx(once.approach, rel=1e-8, abs=1e-16)
     assert once.rotation == mirrored.rotation == 0.0
@@ -50,7 +61,7 @@ def test_exact_mirrored_gap_has_the_mirrored_pressure(heights):
 def test_exact_more_load_closes_more(heights):
     """With twice the load no point of guided pieces opens, and their approach grows."""
     gap = make_gap(heights)
-    once, more = press(PAIR, gap, LOAD), press(PAIR, gap, 2 * LOAD)
+    once, more = press_pair(gap, LOAD), press_pair(gap, 2 * LOAD)
     assert ((once.sigma_n > 0) <= (more.sigma_n > 0)).all()
     assert more.approach > once.approach
 
@@ -58,9 +69,9 @@ def test_exact_more_load_closes_more(heights):
 @given(st.floats(-1e-4, 1e-4))
 def test_exact_spring_between_free_and_guided(angle):
     """A soft spring leaves the rotation of free pieces, a stiff one that of guided pieces, and others lie between."""
-    gap = angle * X
-    free = press(PAIR, gap, LOAD, moment=0.0)
-    turns = [press(PAIR, gap, LOAD, 0.0, spring=spring).rotation for spring in (1e-3, 1e3, 1e9)]
+    gap = angle * make_pair().interface.x
+    free = press_pair(gap, LOAD, moment=0.0)
+    turns = [press_pair(gap, LOAD, 0.0, spring=spring).rotation for spring in (1e-3, 1e3, 1e9)]
     assert free.rotation == pytest.approx(-angle, rel=1e-6, abs=1e-15)
     assert turns[0] == pytest.approx(free.rotation, rel=1e-4, abs=1e-14)
     assert abs(turns[0]) >= abs(turns[1]) >= abs(turns[2])
