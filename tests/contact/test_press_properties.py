@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from pieces import LOAD, make_coated_pair
 from pressed import press
 
+from patchfem.contact import ExponentialAsperities, Holders, press_patch
+
 # Heights [m] of a tilt, a crown and a wave.
 HEIGHTS = st.tuples(*3 * [st.floats(-2e-6, 2e-6)])
 
@@ -76,3 +78,13 @@ def test_exact_spring_between_free_and_guided(angle):
     assert turns[0] == pytest.approx(free.rotation, rel=1e-4, abs=1e-14)
     assert abs(turns[0]) >= abs(turns[1]) >= abs(turns[2])
     assert abs(turns[2]) <= 1e-4 * abs(angle) + 1e-14
+
+
+@given(HEIGHTS)
+def test_exact_guided_pieces_with_asperities_do_not_turn(heights):
+    """Pieces with a layer of asperities turn neither way if they are guided, and not at all at a prescribed approach."""
+    law = ExponentialAsperities(0.5e-6, 1e6)
+    for holder in (Holders(LOAD), Holders(np.nan, 1e-6)):
+        state = press_patch(make_pair(), make_gap(heights), holder, asperities=law)
+        assert state.turn == 0.0
+        assert state.approach == 1e-6 or state.force.sum() == pytest.approx(LOAD, rel=1e-9)
