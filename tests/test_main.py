@@ -163,3 +163,15 @@ def test_always_internal_error_names_file_and_line(tmp_path, monkeypatch):
         .splitlines()[int(found[2]) - 1]
     )
     assert "find_first_period(" in line
+
+
+def test_debug_shows_the_traceback_of_internal_faults_alone(tmp_path, monkeypatch):
+    """With PATCHFEM_DEBUG an internal fault is raised with its traceback; a mistake of a scene still ends with code 2."""
+    monkeypatch.setenv("PATCHFEM_DEBUG", "1")
+    scene = tmp_path / "rig.toml"
+    scene.write_text(RIG + "[unknown]\n", "utf-8")
+    assert run_cli("plan", scene).code == 2
+    scene.write_text(RIG, "utf-8")
+    monkeypatch.setattr(rig, "find_first_period", lambda modes: {}["a key"])
+    with pytest.raises(KeyError, match="a key"):
+        run_cli("plan", scene)

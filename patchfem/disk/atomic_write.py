@@ -71,7 +71,7 @@ def write_rows(path, rows: Iterable[Iterable]) -> None:
 
 
 def write_bytes(path, data) -> None:
-    """Write bytes, `data`, to the file `path` atomically: it is complete, or as it was before."""
+    """Write bytes to the file `path` atomically: after an interruption the file has all of `data` or its old content."""
     with write_atomically(path) as partial:
         partial.write_bytes(data)
 

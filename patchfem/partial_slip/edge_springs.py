@@ -16,12 +16,11 @@ MAX_SPRING_COMPLIANCE_RATIO = 1e6
 
 
 def add_edge_springs(compliance: np.ndarray, is_loaded: np.ndarray, stiffness: float) -> np.ndarray:
-    """Return a compliance matrix with springs at the edges of the contact.
+    """Return a compliance matrix with springs at the edges of the contact, by which it has a given stiffness in full stick.
 
-    With the loaded nodes stuck, the sum of the nodal forces per displacement is K(c) = K - sum_i q_i^2 c/(1 + c
-    lambda_i), where c is the compliance of a spring relative to the diagonal of the matrix (Woodbury identity). If
-    the contact ends only at the ends of the interface, or if no spring is sufficient, the whole matrix is scaled:
-    then the difference is that of the pieces.
+    The stiffness with springs is K(c) = K - sum_i q_i^2 c/(1 + c lambda_i), where c is the compliance of a spring
+    relative to the diagonal of the matrix (Woodbury identity). Without an edge inside the interface, or if no spring
+    gives the stiffness, the whole matrix is scaled instead.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ PATCH_MOTIONS = ("normal", "pitch", "yaw")
 
 
 def make_basis(names: tuple[str, ...], mass: float, **arrays: np.ndarray | None) -> ModalBasis:
-    """Make a modal basis whose arrays are read-only copies; a motion of the patch that no mode has is left out.
+    """Make a modal basis whose arrays are read-only copies; heave, pitch or yaw is None if it is 0 in all modes.
 
     Parameters
     ----------

@@ -89,11 +89,22 @@ class WaveSpectrum(NamedTuple):
 def wave_spectrum(profile: Profile, *, is_tapered: bool = False) -> WaveSpectrum:
     """Compute the spectrum of a levelled profile by a discrete cosine transform.
 
-    The mirror image of the trace continues it without a jump, so the ends add no false short waves, as those of a
-    Fourier series do. The mean squares add up to that of the trace by the trapezoidal rule. If it is tapered
-    (`is_tapered`) with the window of Hann, whose mean square is 3/8, the ends have no kinks either, which blur a
-    single wave, but count less than the middle. Uneven samples are first resampled. Raises PatchfemError for missing
-    heights.
+    A cosine transform continues the trace by its mirror image, without the jump between both ends that gives a Fourier
+    series false short waves. The mean squares of all waves add up to that of the trace (trapezoidal rule). Uneven samples
+    are first resampled.
+
+    Parameters
+    ----------
+    profile : Profile
+        Levelled trace.
+    is_tapered : bool
+        Whether heights are multiplied by the window of Hann, and the spectrum divided by its mean square of 3/8. This
+        removes the kinks of the mirror image, so that a single wave stays sharp, but the ends of the trace count little.
+
+    Raises
+    ------
+    PatchfemError
+        If heights are missing.
     """
     from scipy.fft import dct
 

@@ -1,6 +1,7 @@
 """Force of the phase resonance, amplitudes of given forces, and backbones for several values of a key."""
 
 import csv
+import re
 
 import numpy as np
 import pytest
@@ -99,6 +100,8 @@ def test_exact_quasi_static_force_replaces_the_energy_of_a_cycle():
     viscous = np.pi * omega * 2 * 0.005 * OMEGA * amplitudes**2
     expected = (loss + viscous) / (np.pi * amplitudes)
     assert curve.quasi_static_force.values == pytest.approx(expected, rel=1e-9)
+    # a closed form for a given amplitude has round-off alone as its error
+    assert (curve.quasi_static_force_error.values <= 1.001e-9 * expected).all()
 
 
 def test_exact_force_of_coupled_linear_modes_is_where_their_receptance_is_imaginary():
@@ -232,8 +235,15 @@ def test_refuses_invalid_forces_and_keys(options, message):
 
 
 def test_force_that_no_amplitude_has_is_refused():
-    """A force beyond the travel of the structure is refused with the largest one within it."""
+    """A force beyond the travel of the structure is refused with the range of amplitudes and the forces at its ends."""
     scene = JOINT.replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass')
-    with pytest.raises(pf.PatchfemError, match=r"needs a force of 100 N .* the forces there are"):
+    with pytest.raises(pf.PatchfemError, match="needs a force of 100 N") as refusal:
         pf.backbone(scene, forces=[100.0])
+    words = re.search(
+        r"from ([\d.]+) um to ([\d.]+) um .* are ([\d.]+) mN to ([\d.]+) N;", str(refusal.value)
+    )
+    low, high, weakest, strongest = map(float, words.groups())
+    ends = pf.backbone(scene, amplitudes=[1e-6 * low, 1e-6 * high], method="balance")
+    assert high == 200
+    assert ends.balance_force.values == pytest.approx([1e-3 * weakest, strongest], rel=1e-2)
     assert pf.backbone(scene, forces=[5.0]).balance_amplitude.values < 0.2e-3

@@ -91,3 +91,13 @@ def test_exact_control_characters_in_names_are_masked(tmp_path):
     assert answer.code == 2 and answer.err.count("\n") == 1
     assert "a?[31m?b.toml: cannot be read" in answer.err
     assert make_printable("a\udcffü") == "a?ü"
+
+
+def test_exact_complete_run_that_is_resumed_prints_the_same_json(scene_file, tmp_path):
+    """A complete run with `--resume --json` prints the summary of the run again, with letters outside ASCII."""
+    march = ("--set", "accuracy.method=march", "--set", "drive.cycles=5")
+    words = ("run", scene_file, *march, "-o", tmp_path / "out", "--no-page", "-q", "--json")
+    first = run_cli(*words)
+    again = run_cli(*words, "--resume")
+    assert again.code == 0, again.err
+    assert "ü ± µ" in first.out and again.out == first.out

@@ -74,6 +74,17 @@ def test_exact_colours_are_stress_of_frame(bench_folder):
     assert (1e6 * pieces.get_clim()[1] >= stress).mean() == pytest.approx(0.998, abs=1e-3)
 
 
+def test_vector_picture_does_not_grow_with_the_cells(bench_folder, tmp_path):
+    """An SVG file contains the cells as one picture of points, so that it has fewer paths than the mesh has cells."""
+    frames = read_frames(bench_folder / "fields.vtkhdf")
+    figure, _ = draw_pieces(frames, np.arange(2))
+    figure.savefig(tmp_path / "pieces.svg")
+    text = (tmp_path / "pieces.svg").read_text()
+    n_cells = sum(len(frames.blocks[side].cell_data["von_mises"][0]) for side in ("lower", "upper"))
+    assert text.count("<image") >= 2
+    assert text.count("<path") < n_cells / 2
+
+
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
 def test_exact_pictures_of_a_frame_are_equal_files(small_folder, tmp_path, ending):
     """Two pictures of the same frame are equal byte for byte; an SVG file once had random names of its parts."""

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from patchfem.identify import Problem
 from patchfem.identify.intervals import estimate_effective_rows
@@ -72,3 +74,20 @@ def test_intervals_cover_values_with_correlated_noise():
     assert coverage_of_line_fit("series", range(40), 0.8) >= 0.88
     assert coverage_of_line_fit("rows", range(40), 0.8) <= 0.6
     assert coverage_of_line_fit("series", range(40), 0.0) >= 0.9
+
+
+@pytest.mark.parametrize("residual", [np.zeros(40), np.full(40, 3e-7)], ids=["zero", "constant"])
+def test_exact_residual_without_scatter_counts_every_row(residual):
+    """A residual that is constant, such as that of an exact fit, has no correlation between rows."""
+    assert estimate_effective_rows(residual) == 40
+
+
+@given(st.integers(0, 999), st.floats(-1e6, 1e6), st.sampled_from([1e-9, -3.0, 1e7]))
+def test_exact_effective_rows_depend_on_neither_unit_nor_direction(seed, offset, factor):
+    """The number is that of a residual in another unit, with another mean, or read from its end."""
+    noise = np.random.default_rng(seed).normal(size=203)
+    residual = np.convolve(noise, np.ones(4), "valid")
+    rows = estimate_effective_rows(residual)
+    assert 1 <= rows < 120
+    for same in (factor * residual, residual[::-1], residual + 1e-9 * offset):
+        assert estimate_effective_rows(same) == pytest.approx(rows, rel=1e-6)

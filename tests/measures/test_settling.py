@@ -26,6 +26,19 @@ def test_always_error_covers_two_decays():
     assert np.isnan(steady[0]) and 0 < abs(steady[1] - 1.0) < error[1]
 
 
+@pytest.mark.parametrize("window", [1, 3])
+@pytest.mark.parametrize("extra, is_extrapolated", [(0, False), (1, True)])
+def test_exact_only_the_second_half_of_a_run_is_extrapolated(window, extra, is_extrapolated):
+    """The four windows before the last one have to lie in the second half of the run, or no steady amplitude is stated."""
+    n_cycles = 8 * window + extra
+    amplitude = 2.0 - 0.9 * 0.8 ** np.arange(n_cycles)[None]
+    extremes = np.stack([-amplitude, amplitude], axis=-1)
+    ends = settling.judge_motions(extremes, amplitude + 0j, window, 1e-6, 0.0, 0.0)
+    assert np.isfinite(ends.steady).all() == is_extrapolated
+    if is_extrapolated:
+        assert ends.steady[0, 0] == pytest.approx(2.0, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "amplitudes, outcome",
     [

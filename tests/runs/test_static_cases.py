@@ -95,3 +95,16 @@ def test_always_failed_case_does_not_stop_the_others():
     assert isinstance(batch.messages[1], PatchfemError) and batch.messages.keys() == {1}
     assert np.isnan(batch.values["pressure_peak"][1])
     assert batch.excess[[0, 3]].max() <= 1
+
+
+@pytest.mark.parametrize("springs", [[0.0, 0.0], [1e-6, 1e-2], [1e-6, 1e6]])
+def test_exact_holders_of_a_group_are_those_of_each_case(springs):
+    """A case has the same load, approach, moment and spring in a group as alone, with springs of any stiffness."""
+    patch = pf.build(load_scene(BLOCK + COATING + TILT)).patch
+    group = patch.with_loading(load=LOADS[:2], rotational_stiffness=np.array(springs))
+    holders = folder.cases.make_cases(group, 2).holders
+    for case in range(2):
+        alone = folder.cases.make_cases(folder.cases.take_patch(group, case), 1).holders
+        for name in ("load", "approach", "moment", "spring"):
+            found, expected = getattr(holders, name)[case], getattr(alone, name)[0]
+            assert found == expected or (np.isnan(found) and np.isnan(expected)), name

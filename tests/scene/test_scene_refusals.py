@@ -160,6 +160,9 @@ LIMITS = [  # text, settings, and what the message says; no message if the scene
     (RIG, "structure.mode.axial.frequency=1e300 Hz", "outside the computable range"),
     (RIG, "structure.moving_mass=1e-300 kg", "range; a magnitude from 1e-50 to 1e+50 kg is needed"),
     (RIG, "structure.stiffening.cubic=1e-300 N/m^3", "; 0 or a magnitude from 1e-50 to 1e+50 N/m^3 is needed"),
+    (RIG, "contact.element_size=12.7 mm", ""),
+    (RIG, "contact.element_size=0.126 um", "elements of 1.26e-07 m on a length of 0.0127 m are more than 100000"),
+    (RIG, "contact.element_size=0.127 um", ""),
     # A load has only an upper limit of its magnitude.
     (RIG, "contact.load=1e60 N", "1e+60 N is outside the computable range; a magnitude of at most 1e+50 N is needed"),
     (RIG.replace("[structure]\n", '[structure]\n"mode.².x" = 1\n'), "", "unknown key"),

@@ -10,7 +10,14 @@ from scipy.integrate import quad
 from patchfem import SceneError, plan, run
 from patchfem.core import Outcome, SineDrive
 from patchfem.scene import loads
-from patchfem.structure.drives import RecordedDrive, SweepDrive, make_levels, make_step
+from patchfem.structure.drive_sizes import choose_samples_per_cycle, is_release
+from patchfem.structure.drives import (
+    RecordedDrive,
+    SweepDrive,
+    make_levels,
+    make_release,
+    make_step,
+)
 from patchfem.structure.tones import make_tones
 from patchfem.time_steps.time_march import march
 
@@ -165,3 +172,20 @@ def test_refuses_incomplete_drive(drive, key):
     """A drive with a missing, superfluous or invalid key is refused with the name of the key."""
     with pytest.raises(SceneError, match=key.replace(".", r"\.")):
         loads(f"{RIG}[drive]\n{drive}")
+
+
+def test_exact_only_a_drive_that_is_zero_stores_samples_of_all_cycles():
+    """A release stores samples in equal steps, unless it has too many cycles; every other drive stores reversals alone."""
+    release = make_release(1e-2)
+    assert is_release(release)
+    count = choose_samples_per_cycle(release, 10.0)
+    assert count > 0 and choose_samples_per_cycle(release, 1e12) == 0
+    others = [
+        SineDrive(3.0, OMEGA),
+        make_step(3.0, 1e-2),
+        make_levels([1.0, 2.0], OMEGA, 3),
+        SweepDrive(50.0, 200.0, 2.0, 3.0, None, False),
+    ]
+    for drive in others:
+        assert not is_release(drive)
+        assert choose_samples_per_cycle(drive, 10.0) == 0

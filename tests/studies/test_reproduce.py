@@ -44,3 +44,15 @@ def test_refuses_unknown_part(study):
     """An unknown part is refused with the names of all parts."""
     with pytest.raises(study.PatchfemError, match="table-1, onset, block"):
         study.main(only="table-2", path=None)
+
+
+def test_exact_page_of_one_part_replaces_no_other_page(study, tmp_path, monkeypatch):
+    """The command with `--only table-1` writes a page of this name, and leaves the page of all parts as it is."""
+    monkeypatch.setattr(study, "list_parts", lambda folder: {"table-1": lambda: iter(())})
+    page = tmp_path / "reproduced.md"
+    page.write_text("all parts", "utf-8")
+    study.main(only="table-1", path=page)
+    assert page.read_text("utf-8") == "all parts"
+    assert {path.name for path in tmp_path.iterdir()} == {"reproduced.md", "table-1.md"}
+    study.main(path=page)
+    assert "## table-1" in page.read_text("utf-8")

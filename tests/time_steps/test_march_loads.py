@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from march_contacts import make_pressed_contact
 from pressed import solve_forces
 from varying_load_cases import (
     LAWS,
     LOAD,
     MASS,
+    MIXED,
     STILL,
     crowned_contact,
     find_convergence,
@@ -28,6 +30,9 @@ from varying_load_cases import (
 from patchfem.core import InitialState, SineDrive
 from patchfem.model.structure import compute_band_slides
 from patchfem.partial_slip.shear_modes import find_sufficient_modes, shear_modes
+from patchfem.time_steps.contacts import Press
+from patchfem.time_steps.normal_kernels import average_forces
+from patchfem.time_steps.systems import make_system
 
 # these laws share one compiled loop; Coulomb friction and the tanh law need others
 POINT_LAWS = [
@@ -200,3 +205,32 @@ def test_order_two_with_shear_modes():
     """With modes that combine slide, heave and pitch and a varying contact the march converges with order two."""
     found = find_convergence("bonds", 800, reduce_to_shear_modes(crowned_contact(), 8))
     assert found.order == pytest.approx(2, abs=0.45) and found.change <= 2e-3
+
+
+def test_acceleration_of_a_pressed_motion_is_the_derivative_of_its_velocity():
+    """The stated acceleration under a changing load and moment is the central difference of the velocity, within 0.1 %."""
+    drive = SineDrive(40.0, 2 * np.pi * 143)
+    response = march_pressed(MIXED, drive, crowned_contact(), "plastic", 1, 1600).response
+    velocity = response.modal_rate @ MIXED.output
+    differences = np.gradient(velocity, response.time)[1:-1]
+    stated = (response.acceleration - response.base_acceleration)[1:-1]
+    assert np.ptp(response.extra["normal_load"]) > 0.1 * LOAD
+    assert np.abs(stated - differences).max() <= 1e-3 * np.ptp(differences)
+
+
+def test_exact_averages_of_a_changing_pressure_have_room_and_their_sums():
+    """All nodal forces with weights of 1/m have averages in each direction, whose sums stand behind them.
+
+    The function runs without being compiled, so that an index outside its arrays is an error.
+    """
+    sets = crowned_contact()
+    m = sets.x.size
+    press = Press(sets, MIXED.normal, MIXED.pitch, np.full((2, m, m - 1, 2), 1 / m))
+    contact = make_pressed_contact(LAWS["coulomb"], sets.force, MIXED.slide, press=press)
+    points = make_system(contact, 1e-5, MIXED).points
+    points.loads.nodal[:] = np.arange(1.0, m + 1)
+    average_forces.py_func(points)
+    averages, sums = np.split(points.loads.averaged, [2 * m])
+    assert sums == pytest.approx(averages.reshape(2, m).sum(axis=1), rel=1e-12)
+    assert averages[[0, 2 * m - 1]].tolist() == [0.0, 0.0]
+    assert averages[1] == pytest.approx((1 + 2) / m) and (averages[1:-1] > 0).sum() == 2 * m - 2

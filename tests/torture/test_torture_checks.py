@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from command_line import CommandResult
 from torture import results
+from torture.scenes import check_named_fault
+from torture.toml import list_changed_paths
 from torture.trial import TrialFailure, check_result, limit_time
 
 PLANTED = {
@@ -33,6 +35,17 @@ def test_always_hang_is_detected():
     """A block that takes too long is a failure."""
     with pytest.raises(TrialFailure, match="no end"), limit_time(0.05):
         time.sleep(5)
+
+
+def test_always_refusal_of_another_key_is_detected():
+    """A refusal that names neither the wrong key nor its table is a failure."""
+    right = {"normal": {"load": "1 N"}, "mode": [{"name": "a"}]}
+    wrong = {"normal": {"load": "1 m"}, "mode": [{"name": "a"}]}
+    paths = list_changed_paths(right, wrong)
+    assert paths == [("normal", "load")]
+    check_named_fault("scene.toml:2: normal.load: must be a force", paths)
+    with pytest.raises(TrialFailure, match="does not name load or normal"):
+        check_named_fault("scene.toml:2: drive: missing", paths)
 
 
 def write_summary(folder, **changes):

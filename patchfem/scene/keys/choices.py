@@ -175,10 +175,11 @@ def list_keys_unused_by_value(selector: Selector, value: str) -> tuple[str, ...]
 
 
 class TableChoices(NamedTuple):
-    """Keys of a table that are needed or have no meaning, because of its selectors (keys such as `law`).
+    """Keys that a table needs, and keys without a meaning in it, by its selectors: keys such as `law` that choose others.
 
-    - needs: (keys of which the table needs some, whether one of them must be given, reason).
-    - unused: keys that have no meaning -> selector and value for which they have none.
+    - needs: groups of keys, whether a key of the group is required, and the selector with its value, such as
+      "law 'nonlocal'".
+    - unused: selector with its value, by key without a meaning.
     """
 
     needs: list[tuple[Need, bool, str]]

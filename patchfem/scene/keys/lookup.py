@@ -23,7 +23,7 @@ _UNSPECIFIC_REQUIREMENTS = ("a plain", "a whole", "a text", "plain", "whole", "t
 
 
 class Limit(NamedTuple):
-    """Bound of a number: `name` is the word of pydantic, such as "ge", and `sign` its sign, such as ">="."""
+    """Bound of a number: its `name` in pydantic, such as "ge", and its `sign` in messages, such as ">="."""
 
     name: str
     sign: str

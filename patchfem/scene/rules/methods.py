@@ -371,9 +371,9 @@ def _find_obstacle(method: str, motion: MotionFeatures) -> str:
 
 
 def _find_harmonic_obstacle(motion: MotionFeatures, limits: dict[str, str]) -> str:
-    """Return why the steady motion of a scene cannot be found by the map of a period, or "" if it can.
+    """Return the reason why the steady motion of a scene cannot be found by shooting over a period; "" if it can.
 
-    `limits` has, for each engine, the feature of the `motion` that it does not support, or "".
+    `motion` has the features of the scene. `limits` has the feature that each engine does not support, or "", by engine.
     """
     wave = motion.waveform
     drive = TableView(motion.drive)

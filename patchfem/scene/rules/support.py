@@ -101,7 +101,7 @@ class Joint(TableFacts):
 
     @cached_property
     def _sides(self) -> dict[str, str]:
-        """Piece on which each shape of the patch lies, by the key that says so."""
+        """Piece that has each shape of the patch, "upper" or "lower", by dotted key, such as contact.crown.on."""
         shapes = self.contact.table.shapes if self.contact else {}
         return {f"{self.patch_key}.{name}.on": one.on for name, one in shapes.items() if one.on}
 
@@ -136,7 +136,7 @@ class Joint(TableFacts):
 
     @property
     def unplaced_motion(self) -> str:
-        """Key of a mode that turns or lifts a joint which has no places that move differently; "" if none does."""
+        """Key of a heave, pitch or yaw that the contact cannot follow, because it is a point; "" for none."""
         if self.kind != "rig" or self.contact.area:
             return ""
         is_point = not (self.is_interface or self.contact)

@@ -31,9 +31,9 @@ _WORDS = {name: "|".join(words) for name, words in _NAMES.items()}
 
 
 def _list_rows(table: str) -> dict[str, str]:
-    """Return the rows of a table of together.toml as {condition: sentence}.
+    """Return the rules of a table of together.toml as {condition: sentence}.
 
-    A condition whose first clause has several keys stands for one row with each of them.
+    A condition that begins with several keys, such as "a|b=1", is a rule for each of them: "a=1" and "b=1".
     """
     rows = {}
     for condition, sentence in _TABLES[table].items():

@@ -107,10 +107,17 @@ class Boxes(NamedTuple):
 
 @lru_cache(maxsize=2)
 def make_boxes(degree: int, n_beside: int, n_inside: int) -> Boxes:
-    """Return box functions over all spans of a trace of at least `n_inside` parts.
+    """Return the shapes of worn tracks of every width and position in a trace of N_TRACE_PARTS equal parts.
 
-    Each leaves `n_beside` parts or more on either side of the span. A least-squares polynomial of the given degree is
-    subtracted from each.
+    A shape is 1 inside the track and 0 beside it, less its least-squares polynomial, because the datum of a trace is fitted
+    too.
+
+    Parameters
+    ----------
+    degree : int
+        Degree of the polynomial.
+    n_beside, n_inside : int
+        Smallest numbers of parts on either side of a track and inside it.
     """
     datum = make_polynomials(N_TRACE_PARTS, degree)
     spans = []
@@ -164,7 +171,7 @@ def find_shallow_track(depth) -> ShallowTrack:
 def find_detection_limit(depth, noise) -> float:
     """Return the smallest mean depth [m] at which a track in a trace, or a square worn area in a scan, is found.
 
-    `depth` and `noise` (n,) or (m, n) [m] are the depths and the standard deviation of an unworn one.
+    `depth` (n,) or (m, n) [m] are the computed depths, and `noise` are their standard deviations where nothing is worn.
     """
     if depth.ndim == 1:
         return find_shallow_track(depth).limit

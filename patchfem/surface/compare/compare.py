@@ -93,14 +93,15 @@ QUANTITY_NAMES_BY_AXES = {
 
 
 class Options(NamedTuple):
-    """What is known of two surfaces.
+    """Properties of two surfaces that the user states for their comparison.
 
     - units: of x (and y) and of z, for files that state none.
     - direction: "x" or "y", along which traces run, or lines of scans are evaluated; "" if it is not known.
     - shift: known x of the second trace minus x of the first [m].
-    - datum: "straight" if that of the instrument is known to be, so that no bow is subtracted.
+    - datum: "straight" if the guide of the instrument is straight, so that no bow is subtracted.
     - keep_spikes: whether spikes, dropouts and dust are kept as heights.
-    - cutoff: that of the roughness inside and outside of a track of traces [m]; None for the longest standard one that fits.
+    - cutoff: cut-off [m] of the roughness parameters inside and outside of the track in traces; None for the longest
+      standard cut-off that fits.
     """
 
     units: tuple[str, str] | None = None

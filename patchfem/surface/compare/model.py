@@ -40,21 +40,30 @@ MAX_COMPARED_DATUMS = 3000  # number of datums through modes of tiles that are c
 
 
 class Model:
-    """Depths (n,) at the `known` points of the sampled surface, which both surfaces show at the first place.
+    """Model of the depth between two surfaces as a function of position, datum and gain, for least squares.
 
-    `max_gain_change` is the largest change of the gain that is left, until it is fitted.
+    The depth is the difference of both heights at the points of one of them, the sampled surface: the first of two scans,
+    the second of two traces. The other surface is interpolated by a spline. `known` selects the n points at which both
+    surfaces have heights in the initial position.
 
-    Most methods take a `state`: the place of the second surface, d shifts [m] and a turn (rotation [rad] of scans,
-    stretch of traces), then the k factors [m] of the datum, a line, parabola or plane, and last the change of the gain
-    [1].
-
-    The sampled surface is the one on whose points depths are known: the first of two scans, the second of two traces.
+    Most methods take a `state` with all parameters: d shifts [m] and a turn (rotation [rad] of scans, stretch of traces)
+    of the second surface, then k factors [m] of the datum, a line, parabola or plane, and last the change of the gain
+    [1]. Before the gain is fitted, `max_gain_change` bounds this change.
     """
 
     def __init__(self, sampled: Raster, other: Raster, place: Place, stride: int = 1):
-        """Choose the common points at a place, of each `stride`-th sampled point.
+        """Select the points that both surfaces have in common in an initial position.
 
-        `sampled` and `other` are the surfaces on whose points depths are known, and the one that is interpolated.
+        Parameters
+        ----------
+        sampled : Raster
+            Surface at whose points depths are computed.
+        other : Raster
+            Surface that is interpolated.
+        place : Place
+            Initial position of the second surface.
+        stride : int
+            Of the sampled points only every `stride`-th one along each axis is used.
         """
         every = (..., *(slice(None, None, stride),) * sampled.z.ndim)
         self.sampled = Raster(sampled.z[every], sampled.origin, sampled.steps * stride)
@@ -237,9 +246,10 @@ class Model:
 def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     """Return the factors (k,) of the datum on which the unworn heights lie.
 
-    Datums through the modes of k tiles are improved by concentration steps of least trimmed squares (Rousseeuw and
-    Van Driessen 1999). Among those with a small scale, the best one has an unworn end, few heights above it, as wear
-    does not raise a surface, and many on it.
+    Each trial datum passes through the most frequent depths of k tiles, and is improved by concentration steps of least
+    trimmed squares (Rousseeuw and Van Driessen 1999). Of the trials with the smallest residuals that one is chosen which
+    agrees with many heights, also at an end that may be unworn, and which few heights exceed, as wear does not raise a
+    surface.
 
     Parameters
     ----------

@@ -119,7 +119,7 @@ def smooth(z, deviations) -> np.ndarray:
 def remove_long_waves(z, part: float = SIDE_OVER_LONG_WAVE_GAUSSIAN) -> np.ndarray:
     """Subtract the Gaussian mean line or surface from heights z (n,) or (m, n) without gaps.
 
-    `part` is the size of the surface over the standard deviation of the Gaussian.
+    The Gaussian has a standard deviation of the length of the surface along each axis divided by `part`.
     """
     return z - smooth(z, np.array(z.shape) / part)
 

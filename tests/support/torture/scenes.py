@@ -7,8 +7,8 @@ from pathlib import Path
 from patchfem.effects import LAWS, WAVEFORMS
 
 from .results import run_scene
-from .toml import Raw, get_parent, list_paths, list_schema_keys, to_toml
-from .trial import Trial
+from .toml import Raw, get_parent, list_changed_paths, list_paths, list_schema_keys, to_toml
+from .trial import Trial, TrialFailure
 
 # Cheap scenes of every kind of run, table, law, drive and method, drawn at random by the grammar of version 1.11
 # (`torture/grammar.py`). Combinations that are not permitted are among them.
@@ -108,11 +108,29 @@ def draw_scene(trial: Trial) -> dict:
 
 
 def run_grammar_trial(trial: Trial) -> None:
-    """Run a random scene with none to four wrong keys."""
+    """Run a random scene with none to four wrong keys; the refusal of a single one names it."""
     tables = draw_scene(trial)
-    for _ in range(trial.draw(0, 0, 1, 1, 1, 2, 4)):
+    n_mistakes = trial.draw(0, 0, 1, 1, 1, 2, 4)
+    right = copy.deepcopy(tables)
+    for _ in range(n_mistakes):
         mutate_scene(trial, tables)
-    run_scene(trial, write_scene(trial, to_toml(tables).encode("utf-8", "surrogatepass")))
+    name = write_scene(trial, to_toml(right).encode("utf-8", "surrogatepass"))
+    is_right = n_mistakes == 1 and trial.run("check", name).code == 0
+    write_scene(trial, to_toml(tables).encode("utf-8", "surrogatepass"))
+    if is_right:
+        refusal = trial.run("check", name)
+        if refusal.code == 2:
+            check_named_fault(refusal.err, list_changed_paths(right, tables))
+    run_scene(trial, name)
+
+
+def check_named_fault(message: str, paths: list[tuple]) -> None:
+    """Raise TrialFailure if a refusal has no word of the keys at `paths`, or of the tables that contain them."""
+    words = {str(key)[:20] for path in paths for key in path if isinstance(key, str)}
+    if not any(word in message for word in words):
+        raise TrialFailure(
+            f"the refusal does not name {' or '.join(sorted(words))}: {message[:300]}"
+        )
 
 
 def run_bytes_trial(trial: Trial) -> None:

@@ -83,6 +83,18 @@ def list_paths(table: dict, prefix: tuple = ()) -> list:
     return out
 
 
+def list_changed_paths(before: dict, after: dict) -> list[tuple]:
+    """Return the paths of the keys that one of two scenes lacks, or that have different values in them."""
+    first, second = (
+        {path: format_value(get_parent(tables, path)[path[-1]]) for path in list_paths(tables)}
+        for tables in (before, after)
+    )
+    paths = [path for path in {**first, **second} if first.get(path) != second.get(path)]
+    return [
+        path for path in paths if not any(other[: len(path)] == path != other for other in paths)
+    ]
+
+
 def get_parent(tables: dict, path: tuple):
     """Return the table or list that contains the last key of a path."""
     for key in path[:-1]:
