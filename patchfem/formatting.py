@@ -24,6 +24,7 @@ UNIT_LADDERS = {  # display units (name, number of these in one SI unit) for eac
     "N": (("uN", 1e6), ("mN", 1e3), ("N", 1.0), ("kN", 1e-3), ("MN", 1e-6)),
     "J": (("nJ", 1e9), ("uJ", 1e6), ("mJ", 1e3), ("J", 1.0), ("kJ", 1e-3)),
     "N m": (("uN m", 1e6), ("mN m", 1e3), ("N m", 1.0), ("kN m", 1e-3)),
+    "m N-1": (("um/N", 1e6),),
     "N m-1": (("N/m", 1.0), ("N/mm", 1e-3), ("N/um", 1e-6)),
     "N m rad-1": (("N m/rad", 1.0), ("kN m/rad", 1e-3), ("MN m/rad", 1e-6)),
     "m2": (("um^2", 1e12), ("mm^2", 1e6), ("m^2", 1.0)),

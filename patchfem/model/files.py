@@ -18,6 +18,7 @@ from ..scene.rules.structure import MATRIX_KEYS
 from . import (
     face,
     gap,
+    layer_heights,
     patch,
     peaks,
     pieces,
@@ -189,10 +190,16 @@ def _check_asperities(path: Path, tables) -> None:
     peaks.read_spectral_moments(path, patch.find_shortest_wavelength(tables.contact, length))
 
 
+def _check_layer_heights(path: Path, tables) -> None:
+    """Check that the trace or the scan in the file `path` is longer than the cut-off of the layer of the scene."""
+    layer_heights.read_heights(path, tables.contact.asperities.cutoff)
+
+
 # Function that reads a file without using the other keys of the scene, by the key that names it. Modules are loaded on use.
 FILE_READERS = {
     "contact.mesh": lambda path: files.read_pieces(path),
     "contact.asperities.from": lambda path: peaks.read_spectral_moments(path),
+    "contact.asperities.heights": lambda path: layer_heights.read_heights(path),
     "contact.profile.file": lambda path: profile.read_trace(path),
     "contact.profile.scan": lambda path: face.read_scan(path),
     "slide.file": lambda path: slide.read_path_file(path),
@@ -208,6 +215,7 @@ FILE_READERS = {
 FILE_CHECKS = {
     "contact.mesh": _check_mesh,
     "contact.asperities.from": _check_asperities,
+    "contact.asperities.heights": _check_layer_heights,
     "contact.profile.file": _check_profile,
     "contact.profile.scan": _check_scan,
     "drive.file": _check_drive,

@@ -372,6 +372,8 @@ def build_patch(contact: Contact, resolve_path: FindPath) -> PatchModel:
     if skin is not None and skin.law == "hertz":
         cutoff = find_shortest_wavelength(contact, pieces.length)
         skin = peaks.complete_asperities(skin, resolve_path, cutoff)
+    if skin is not None and skin.heights is not None:
+        skin = skin.model_copy(update={"heights": str(resolve_path(skin.heights))})
 
     return PatchModel(
         pieces=pieces,

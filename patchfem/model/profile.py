@@ -149,6 +149,26 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
     return replace(trace, x=frozen_array(x), z=frozen_array(line), notes=())
 
 
+def list_short_wave_heights(path: Path, x, cutoff: float, *, is_material: bool) -> np.ndarray:
+    """Return the heights (k,) [m] of the waves of a profile shorter than a cut-off; larger heights are more material.
+
+    Parameters
+    ----------
+    path : Path
+        File to read.
+    x : (m,) ndarray
+        Coordinates [m] whose ends are those of the interface.
+    cutoff : float
+        Cut-off [m]; longer waves are the shape of the gap (`compute_profile_gap`).
+    is_material : bool
+        Whether the heights in the file are those of a surface, and not of the gap.
+    """
+    cell = min(cutoff / MIN_ELEMENTS_PER_WAVE, float(x[-1] - x[0]))
+    trace = level_profile(path, x, cell, is_material=is_material).profile
+    waves = _filter_waviness(trace, cutoff)
+    return waves.z - np.interp(waves.x, trace.x, trace.z)
+
+
 def _describe_short_waves(trace: Profile, cutoff: float) -> tuple[str, ...]:
     """Return sentences about the waves of a trace shorter than `cutoff` [m], or () if there are none."""
     fraction = wave_spectrum(trace).lost_fraction(cutoff)

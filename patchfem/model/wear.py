@@ -220,8 +220,10 @@ def _describe_pieces(scene: dict[str, dict[str, Any]]) -> dict[str, Any]:
         for key, value in scene["contact"].items()
         if key not in LOADING_KEYS and key not in SURFACE_KEYS
     }
-    if "contact.area" in pieces:
-        pieces["contact.area"] = pieces["contact.area"] | {"cells": None}
+    # Paths are relative to the folder of each run.
+    for key, names in (("contact.area", ("cells",)), ("contact.asperities", ("from", "heights"))):
+        if key in pieces:
+            pieces[key] = pieces[key] | dict.fromkeys(names)
     return pieces | {"wear.upper_share": scene["wear"]["upper_share"]}
 
 

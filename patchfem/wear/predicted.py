@@ -3,8 +3,9 @@
 By Archard's law the worn depth depends on the product of wear coefficient and cycles alone. The depths that a run passes
 through are therefore those of smaller coefficients after all of its cycles, although the pressure changes as the pieces
 wear. Coefficient and position are fitted by least squares to means of both depths over a hundredth of the patch. The
-interval contains the noise and the datum of the measured depth, the scatter of the measured wear about the computed one,
-the numerical error of the run, and the change by another interpolation between the frames. Read `fit_wear` first.
+interval contains the noise, the datum and the gain of the measured depth, the scatter of the measured wear about the
+computed one, the numerical error of the run, and the change by another interpolation between the frames. Read `fit_wear`
+first.
 """
 
 from dataclasses import dataclass, replace
@@ -41,6 +42,7 @@ class MeasuredDepth(NamedTuple):
     - correlation: number of neighbouring samples that share an error.
     - datum_error: standard deviation [m] of an error that is common to all depths.
     - width: width [m] of the longest track, or None.
+    - gain_error: standard deviation [1] of a factor that is common to all depths.
     """
 
     x: np.ndarray
@@ -49,6 +51,7 @@ class MeasuredDepth(NamedTuple):
     correlation: float
     datum_error: float
     width: float | None
+    gain_error: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,12 +127,14 @@ class Bins(NamedTuple):
     - edges: (b + 1,) [m].
     - depth, noise: mean depth and its standard deviation (b,) [m].
     - datum_error: standard deviation [m] of an error that is common to all depths.
+    - gain_error: standard deviation [1] of a factor that is common to all depths.
     """
 
     edges: np.ndarray
     depth: np.ndarray
     noise: np.ndarray
     datum_error: float
+    gain_error: float
 
     @property
     def middles(self) -> np.ndarray:
@@ -261,7 +266,7 @@ def _average_measured(measured: MeasuredDepth, history: WearHistory) -> Bins:
     count = max(width / (step * max(measured.correlation, 1.0)), 1.0)
     middles = (edges[1:] + edges[:-1]) / 2
     noise = np.interp(middles, measured.x, measured.noise) / np.sqrt(count)
-    return Bins(edges, depth, noise, measured.datum_error)
+    return Bins(edges, depth, noise, measured.datum_error, measured.gain_error)
 
 
 def _suspect_units(ratio: float, axis: str) -> str:
@@ -470,9 +475,10 @@ def _measure_spread(
     n_blocks = max(count / length, 3.0 + 2)
     freedom = n_blocks - 2
 
-    gain = np.linalg.pinv(jacobian)
+    inverse = np.linalg.pinv(jacobian)
     scatter = residual @ residual / residual.size * n_blocks / freedom * length
     student = float(stdtrit(freedom, (1 + CONFIDENCE_LEVEL) / 2)) / HALF_WIDTH_95
-    from_scatter = student * np.sqrt(scatter * (gain**2).sum(axis=1))
-    variance = gain**2 @ bins.noise**2 + (bins.datum_error * gain.sum(axis=1)) ** 2
+    from_scatter = student * np.sqrt(scatter * (inverse**2).sum(axis=1))
+    variance = inverse**2 @ bins.noise**2 + (bins.datum_error * inverse.sum(axis=1)) ** 2
+    variance += (bins.gain_error * (inverse @ computed)) ** 2
     return np.sqrt(from_scatter**2 + variance).tolist(), n_blocks

@@ -241,5 +241,6 @@ def test_exact_compliance_of_response_curves_is_a_choice_of_a_menu(folders):
         "amplitude",
         "compliance (amplitude / force)",
     ]
+    assert "um/N" in panel.choices[1].y.label
     first, second = panel.choices[1].curves
     assert first.y.tolist() == second.y.tolist()

@@ -82,6 +82,21 @@ def test_exact_common_error_of_depths_widens_the_interval():
     assert added / abs(moved.value - plain.value) == pytest.approx(1.96, rel=0.05)
 
 
+def test_exact_gain_error_widens_the_interval():
+    """A standard deviation of the gain moves the coefficient as depths that are larger by this factor do."""
+    measured = measure_depth(0.7)._replace(datum_error=0.0)
+    plain, moved, wide = (
+        fit_wear(each, make_history()).coefficient
+        for each in (
+            measured,
+            measured._replace(depth=1.01 * measured.depth),
+            measured._replace(gain_error=0.01),
+        )
+    )
+    added = np.sqrt((wide.high - wide.low) ** 2 - (plain.high - plain.low) ** 2) / 2
+    assert added / abs(moved.value - plain.value) == pytest.approx(1.96, rel=0.05)
+
+
 def test_always_interval_covers_true_coefficient():
     """With wear that scatters along the trace by 8 %, the interval covers the truth in at least 27 of 30 traces."""
     covers = 0

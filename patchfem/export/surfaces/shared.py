@@ -165,22 +165,24 @@ def _describe_loss(comparison: Comparison) -> str:
             axis = "y" if name.endswith("y") else "x"
             parts[0] += f", {axis} = {quantities.format_value(values[name].value, 'm')}"
     if comparison.track is not None:
-        parts.insert(0, _describe_track(comparison.track))
+        parts.insert(0, _describe_track(comparison.track, len(comparison.tracks)))
     if is_known(values.get("worn_volume")):
         parts.insert(0, f"{format_value('worn_volume', values['worn_volume'])} are lost")
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _describe_track(track: Track) -> str:
-    """Return the clause on place, width and mean depth of a track."""
+def _describe_track(track: Track, n_tracks: int) -> str:
+    """Return the clause on place, width and mean depth of a track, the longest of `n_tracks`."""
     places = ["the beginning of the common part", "the end of the common part"]
     for side, name in enumerate(("from", "to")):
         end = track.values[name]
         if is_known(end) and not track.cut[side]:
             places[side] = quantities.format_value(end.value, "m", digits=5)
     width, depth = (format_value(name, track.values[name]) for name in ("width", "depth_mean"))
-    return f"a track from {places[0]} to {places[1]} of the second trace is {width} wide and {depth} deep on average"
+    which = f"the longest of {n_tracks} tracks," if n_tracks > 1 else "a track"
+    where = f"from {places[0]} to {places[1]} of the second trace{',' * (n_tracks > 1)}"
+    return f"{which} {where} is {width} wide and {depth} deep on average"
 
 
 def describe_waves(ratio: Quantity | None) -> list[str]:

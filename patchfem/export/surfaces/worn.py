@@ -186,9 +186,15 @@ def _measure_depth(comparison: Comparison) -> MeasuredDepth:
     datum_error = (area.high - area.low) / (2 * HALF_WIDTH_95) / np.ptp(x)
     track = comparison.track
     width = None if track is None or any(track.cut) else track.values["width"].value
-    correlation = curves.errors.correlation
+    errors = curves.errors
     return MeasuredDepth(
-        x, curves.depth[known], curves.noise[known], correlation, datum_error, width
+        x,
+        curves.depth[known],
+        curves.noise[known],
+        errors.correlation,
+        datum_error,
+        width,
+        errors.gain,
     )
 
 

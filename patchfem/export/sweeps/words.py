@@ -81,7 +81,10 @@ def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRa
     column = table.select_trusted(name)
     round_off = VALUE_ROUND_OFF * np.nanmax(np.abs(column.values), initial=0.0)
     ends = [0.0 if abs(column.values[case]) <= round_off else column.values[case] for case in cases]
-    low, high = (_format_measure(name, column.unit, end) for end in ends)
+    low, high = (
+        _format_measure(name, column.unit, end, _find_large_error(table, name, case))
+        for end, case in zip(ends, cases)
+    )
     varied = [key for key in table.keys if key.count > 1]
     if len(varied) != 1:
         share = ""
@@ -91,8 +94,10 @@ def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRa
 
     places = [format_value(varied[0].values[case], varied[0].unit) for case in cases]
     words = f"from {low} at {places[0]} to {high} at {places[1]}"
+    # a peak over the frequency has a sentence of its own
+    has_peak = any(entry.measure == name for entry in analysis.peaks)
     for extreme in analysis.extremes:
-        if extreme.measure == name:
+        if extreme.measure == name and not has_peak:
             side = "largest" if extreme.is_largest else "smallest"
             first, last = (format_value(one, extreme.unit) for one in extreme.interval)
             if extreme.band is None:
@@ -102,7 +107,9 @@ def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRa
                 continue
             numbers = (extreme.place, *extreme.band)
             place, begin, end = (format_value(one, extreme.unit) for one in numbers)
-            value = _format_measure(name, column.unit, extreme.value)
+            case = cases[extreme.is_largest]
+            error = _find_large_error(table, name, case)
+            value = _format_measure(name, column.unit, extreme.value, error)
             words += f" ({side}, {value}, at {place}, {first} to {last}; within 5 % of it from {begin} to {end})"
     return words
 
@@ -112,9 +119,19 @@ def _name_in_words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _format_measure(name: str, unit: str, value: float) -> str:
-    """Return a value of a measure, given in SI units, with its unit, which 0 does not need."""
+def _format_measure(name: str, unit: str, value: float, error: float | None = None) -> str:
+    """Return a value of a measure, given in SI units, with its error and its unit, which 0 does not need."""
+    if error is not None:
+        return format_quantity(name, Quantity(value, unit, error))
     return format_value(value, unit, name=name) if value else "0"
+
+
+def _find_large_error(table: SweepTable, name: str, case: int) -> float | None:
+    """Return the error of a measure in a case that misses the tolerance, in SI units; None where it meets it."""
+    column = table.select_trusted(name)
+    if not column.misses(table.tolerance)[case]:
+        return None
+    return float(column.errors[case])
 
 
 def _describe_limit(limits: list[KeyLimit]) -> str:

@@ -5,7 +5,6 @@ The state is saved after every jump. A run that continues from a saved state giv
 results as an uninterrupted run.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -18,8 +17,9 @@ from ...core import PatchfemError, array_dataclass, frozen_array
 from ...model.patch import PatchPiece
 from ...model.wear import interpolate_nodes
 from ...time_steps.checkpoint import RETRY_ADVICE, read_state, write_state
-from ...wear.depth import wear_rates
+from ...wear.depth import Press, wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
+from ...wear.rough_layer import RoughLayer, make_rough_layer, make_rough_press
 from ..patch import area
 from ..patch.measures import with_static_measures
 from ..patch.press import (
@@ -72,6 +72,7 @@ class WornPatch:
     - depths: worn depths (k,) [m] on the nodes of each coarser mesh.
     - seconds: CPU seconds.
     - stopped: reason why the computation ended early; "" if it did not.
+    - layer: rough layer that wears, None without one.
     """
 
     patch: Patch
@@ -81,6 +82,7 @@ class WornPatch:
     depths: tuple[np.ndarray, ...]
     seconds: float
     stopped: str
+    layer: RoughLayer | None = None
 
 
 # State of the wear after the last jump, and the history of all jumps
@@ -108,8 +110,9 @@ class _Wear:
     def __init__(self, model, patch):
         self.model = model
         self.patch = patch
+        self.layer = find_rough_layer(model, patch)
         self.problem = WearProblem(
-            _make_force_function(patch),
+            _make_force_function(patch, self.layer),
             self.move,
             patch.pieces.interface.weight,
             model.wear.coefficient,
@@ -127,13 +130,17 @@ class _Wear:
         """Return the slip path (m,) [m] per cycle at a worn depth [m]."""
         if self.last is None or not self.is_same_motion:
             worn = np.zeros_like(worn) if self.is_same_motion else worn
-            patch = solve_worn(self.patch, worn)
+            patch = self.press(self.patch, worn)
             n_frames = choose_frame_count(self.model.accuracy.tolerance)
             slip = compute_cycle_slip(make_worn_model(self.model, patch, worn), patch, n_frames)
             if slip.outcome is not None:
                 raise _UnboundedMotion(slip.outcome.sentence)
             self.last = slip
         return self.last.path
+
+    def press(self, patch, worn) -> Patch:
+        """Return an unworn patch, pressed with a worn depth (m,) [m] and the layer that wears."""
+        return solve_worn(patch, worn, self.layer)
 
     def start(self) -> WearState:
         """Return the state before the first jump, which has the worn depth of an earlier run.
@@ -207,7 +214,7 @@ class _Wear:
         """Return contact, slip path and measures of the patch, solved with the worn depth of a state, as a WearMoment."""
         worn = make_worn_model(self.model, patch, state.depth)
         values = compute_values(patch) | self.last.values
-        values |= compute_worn_volume_and_depth(patch, state.depth)
+        values |= compute_worn_values(patch, state.depth, self.layer)
 
         # Wear changes the grooves and, by a table, the friction law.
         if self.model.grooves is not None:
@@ -233,8 +240,9 @@ class _Wear:
             jumps.append((after.cycle - before.cycle, path))
         wear = self.model.wear
         depth = wear.compute_earlier_depth(axes, areas)
-        depth = replay_jumps(_make_force_function(mesh), areas, wear.coefficient, jumps, depth)
-        return solve_worn(mesh, frozen_array(depth)), depth
+        press = _make_force_function(mesh, self.layer)
+        depth = replay_jumps(press, areas, wear.coefficient, jumps, depth)
+        return self.press(mesh, frozen_array(depth)), depth
 
 
 def compute_mean_worn_depth(patch, depth) -> float:
@@ -309,15 +317,15 @@ def compute_wear(
         if state is None:
             state = wear.start()
             if model.wear.start is not None:
-                patch = solve_worn(patch, frozen_array(state.depth))
+                patch = wear.press(patch, frozen_array(state.depth))
             moments = (wear.record(patch, state),)
         else:
-            patch = solve_worn(patch, frozen_array(state.depth))
+            patch = wear.press(patch, frozen_array(state.depth))
 
         # Press, move and wear, jump by jump
         while state.cycle < n_cycles and find_worn_through_coating(model, state.depth) is None:
             state = wear.jump(state)
-            patch = solve_worn(patch, frozen_array(state.depth))
+            patch = wear.press(patch, frozen_array(state.depth))
             moments = (*moments, wear.record(patch, state))
             if store is not None:
                 store(state, moments)
@@ -338,7 +346,7 @@ def compute_wear(
     patch, *worn = add_measures((patch, *worn), model.accuracy.tolerance)
     depths = tuple(depth for _, depth in replayed)
     seconds = process_time() - clock
-    return WornPatch(patch, tuple(worn), state, moments, depths, seconds, stop_reason)
+    return WornPatch(patch, tuple(worn), state, moments, depths, seconds, stop_reason, wear.layer)
 
 
 class WornPiece(NamedTuple):
@@ -387,11 +395,44 @@ def _list_axes(patch) -> tuple[np.ndarray, ...]:
     return (patch.x,) if patch.model.area is None else (cells.y, cells.x)
 
 
-def solve_worn(patch, worn):
-    """Solve the contact of a patch again on its mesh or cells, with a worn depth [m] added to its unworn gap."""
+def solve_worn(patch, worn, layer: RoughLayer | None = None):
+    """Solve the contact of a patch again on its mesh or cells, with a worn depth (m,) [m] added to its unworn gap.
+
+    Tops of a rough layer that wears lose more height than this depth, so that the gap under load opens further; the
+    unloaded gap remains that of the mean surfaces.
+    """
+    opening = worn if layer is None else frozen_array(layer.measure_opening(worn))
     if patch.model.area is not None:
-        return area.press_worn(patch, worn)
-    return solve_patch_contact(patch.model, patch.pair, worn, coarse=patch)
+        pressed = area.press_worn(patch, opening)
+    else:
+        pressed = solve_patch_contact(patch.model, patch.pair, opening, coarse=patch)
+    if layer is None:
+        return pressed
+    return replace(pressed, unloaded_gap=frozen_array(pressed.unloaded_gap - opening + worn))
+
+
+def find_rough_layer(model, patch) -> RoughLayer | None:
+    """Return the rough layer of a patch that wears, with the tops that the load has pressed flat; None without one.
+
+    Parameters
+    ----------
+    model : Model
+        Unworn model with [wear].
+    patch : Patch
+        Unworn patch.
+    """
+    skin = model.patch.interface.skin
+    if skin is None or skin.hardness is None:
+        return None
+    # Filters of traces and scans are imported for such a layer only.
+    from ...model.layer_heights import read_layer_heights
+
+    pressure = patch.normal_stress
+    force = pressure * patch.pieces.interface.weight
+    is_upper = model.patch.gap.side == "upper"
+    share = model.wear.upper_share if is_upper else 1 - model.wear.upper_share
+    mean_pressure = float(force @ pressure / force.sum()) if force.any() else 0.0
+    return make_rough_layer(read_layer_heights(model.patch), skin.hardness, mean_pressure, share)
 
 
 def compute_values(patch) -> Values:
@@ -401,19 +442,41 @@ def compute_values(patch) -> Values:
     return compute_static_values(patch)
 
 
-def _make_force_function(patch) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """Return a function of worn depth and softening that computes the contact forces [N] (`wear.depth.Press`)."""
+def _make_force_function(patch, layer: RoughLayer | None) -> Press:
+    """Return the contact forces [N] of a patch as a function of worn depth and softening; `layer` is one that wears."""
     if patch.model.area is not None:
-        return area.make_force_function(patch)
-    return make_contact_force_function(patch.model, patch.pair)
+        press = area.make_force_function(patch)
+    else:
+        press = make_contact_force_function(patch.model, patch.pair)
+    return press if layer is None else make_rough_press(press, layer)
 
 
-def compute_worn_volume_and_depth(patch, depth) -> Values:
-    """Return the worn volume [m3] and the largest worn depth [m] of a patch by name, for the depth (m,) [m] at its nodes."""
-    return {
-        "worn_volume": float(np.vdot(depth, patch.pieces.interface.weight)),
+def compute_worn_values(patch, depth, layer: RoughLayer | None = None) -> Values:
+    """Return worn volume, worn depth, and what a rough layer has lost, by the names of their measures, in SI units.
+
+    Parameters
+    ----------
+    patch : Patch
+        Worn patch.
+    depth : (m,) array
+        Worn depth [m] at its nodes.
+    layer : RoughLayer, optional
+        Layer that wears.
+    """
+    weight = patch.pieces.interface.weight
+    values = {
+        "worn_volume": float(np.vdot(depth, weight)),
         "worn_depth_max": float(depth.max(initial=0.0)),
     }
+    if layer is not None:
+        pressure = patch.normal_stress
+        touching = layer.measure_touching_part(depth, pressure) * (pressure > 0)
+        values |= {
+            "worn_depth_mean": compute_mean_worn_depth(patch, depth),
+            "worn_top_height": float(layer.measure_lost_height(depth).max(initial=0.0)),
+            "touching_fraction": float(touching @ weight / weight.sum()),
+        }
+    return values
 
 
 def save_wear_state(

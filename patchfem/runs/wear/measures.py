@@ -13,13 +13,13 @@ from ...convergence import convergence_error
 from ...core import Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...measures.errors import estimate_convergence_errors
-from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, make_measure
+from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, Values, make_measure
 from ..results.result import UNBOUNDED_OUTCOMES, WearHistory
 from .evolve import (
     WORN_THROUGH_FRACTION,
     compute_mean_worn_depth,
     compute_values,
-    compute_worn_volume_and_depth,
+    compute_worn_values,
     find_worn_through_coating,
     list_worn_pieces,
     solve_worn,
@@ -31,7 +31,14 @@ WORN_ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-
 # Note on the wear of a trace whose short waves are represented by asperities
 SPLIT_TRACE_NOTE = (
     "worn_depth_max is a mean over the short waves that [contact.asperities] represents: single peaks wear deeper; the "
-    "layer itself does not wear, its stiffness and decay length stay those of the new surface"
+    "layer itself does not wear, its stiffness and decay length stay those of the new surface; with "
+    "contact.asperities.hardness its tops wear"
+)
+# Note on a rough layer that wears
+WORN_LAYER_NOTE = (
+    "worn_depth_max and worn_depth_mean are means over the waves of the rough layer; worn_top_height is what its tops "
+    "lose; the layer loses height, but its stiffness and decay length stay those of the new surface; the errors leave out "
+    "that another trace has other heights"
 )
 MEASURE_BY_HOLDER_MOTION = {"closing": "approach", "rotation": "rotation"}
 
@@ -72,7 +79,11 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
         result = _widen_errors_by_jumps(result, evolved)
 
     # A run that continues an earlier one, or wears through a coating, says so.
-    notes = [*result.notes, *[SPLIT_TRACE_NOTE] * model.patch.gap.is_split]
+    notes = [*result.notes]
+    if evolved.layer is not None:
+        notes.append(WORN_LAYER_NOTE)
+    elif model.patch.gap.is_split:
+        notes.append(SPLIT_TRACE_NOTE)
     if model.wear.start is not None:
         notes.append(model.wear.start.sentence)
     outcome = result.outcome
@@ -133,7 +144,7 @@ def _widen_errors_by_jumps(result, evolved):
         The worn patch with its jumps, also on the coarser meshes.
     """
     coarse_depth = frozen_array(evolved.state.coarse_depth)
-    coarse = compute_values(solve_worn(evolved.patch, coarse_depth))
+    coarse = compute_values(solve_worn(evolved.patch, coarse_depth, evolved.layer))
     fine_values = compute_values(evolved.patch)
     measures = dict(result.measures)
     for name, value in fine_values.items():
@@ -187,22 +198,16 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool =
     with_errors : bool
         Whether to estimate the errors.
     """
-    state = evolved.state
     first = evolved.moments[0]
     last = evolved.moments[-1]
-    weight = evolved.patch.pieces.interface.weight
-    area = float(weight.sum())
+    area = float(evolved.patch.pieces.interface.weight.sum())
     slip_error = last.miss + _relative_slip_error(motion) + _relative_slip_change(last, motion)
-    changes = np.abs(state.depth - state.coarse_depth)
-    jump_errors = {
-        "worn_volume": float(np.vdot(changes, weight)) + state.path_error * area,
-        "worn_depth_max": state.error,
-    }
+    jump_errors = _estimate_jump_errors(evolved)
 
     # Values on the coarser meshes, for the errors; a single mesh shows no error.
     values = {name: last.values[name] for name in jump_errors}
     meshes = zip(evolved.coarse, evolved.depths)
-    coarse = [compute_worn_volume_and_depth(*mesh) for mesh in meshes] if with_errors else []
+    coarse = [compute_worn_values(*mesh, evolved.layer) for mesh in meshes] if with_errors else []
     mesh_errors = estimate_convergence_errors(values, *coarse) if coarse else {}
 
     # The errors of jumps, slip path, mesh, round-off and earlier run add up.
@@ -224,6 +229,25 @@ def _measure_patch_wear(model, evolved, motion: Measures, *, with_errors: bool =
         error = None if error is None else error / area
         measures[name] = make_measure(name, last.values[name], error, WORN_SOURCE)
     return measures
+
+
+def _estimate_jump_errors(evolved) -> Values:
+    """Return the errors of the measures of a `WornPatch` due to the finite length of the jumps, by name, in SI units."""
+    state = evolved.state
+    patch = evolved.patch
+    weight = patch.pieces.interface.weight
+    changes = np.abs(state.depth - state.coarse_depth)
+    errors = {
+        "worn_volume": float(np.vdot(changes, weight)) + state.path_error * float(weight.sum()),
+        "worn_depth_max": state.error,
+    }
+    # What a rough layer has lost is a function of the depth at each node.
+    moved = state.depth + changes + state.path_error
+    values, ends = (
+        compute_worn_values(patch, depth, evolved.layer) for depth in (state.depth, moved)
+    )
+    others = values.keys() - errors.keys()
+    return errors | {name: abs(ends[name] - values[name]) for name in sorted(others)}
 
 
 def _measure_worn_friction(model, evolved, motion: Measures, error: float | None) -> Measures:

@@ -57,11 +57,14 @@ KEY_SELECTORS = (
         contact.Asperities,
         "law",
         {
-            "linear": ("normal_stiffness", "cutoff tangential_ratio"),
-            "exponential": ("decay_length", "normal_stiffness cutoff tangential_ratio"),
+            "linear": ("normal_stiffness", "cutoff tangential_ratio hardness heights"),
+            "exponential": (
+                "decay_length",
+                "normal_stiffness cutoff tangential_ratio hardness heights",
+            ),
             "hertz": (
                 "radius+density+height_deviation|from|rms_height+rms_slope+rms_curvature",
-                "cutoff tangential_ratio",
+                "cutoff tangential_ratio hardness heights",
             ),
         },
     ),

@@ -287,6 +287,16 @@ class Asperities(Table):
         "shorter waves to the asperities; default: with [contact.profile], 1/100 of the length of the interface; "
         "without it, all waves of the trace in `from` belong to the asperities",
     )
+    hardness: optional(
+        quantity("pressure", gt=0),
+        "largest pressure of the tops of the rough layer; with [wear] the layer then wears: its heights are cut at the "
+        "level of the worn tops; default: the layer does not wear",
+    )
+    heights: optional(
+        FileName,
+        "file of a trace or an areal scan with the heights of the layer that wears, of waves shorter than `cutoff` if it is "
+        "given; default: the short waves of the trace in [contact.profile]",
+    )
     tangential_ratio: optional(
         Positive,
         "tangential stiffness of the rough layer divided by its normal stiffness; default: the layer is rigid along x",

@@ -60,6 +60,32 @@ def test_always_round_off_is_shown_as_zero_and_missed_measures_are_counted():
     assert text in make_verdict(table, over)[-1]
 
 
+def test_exact_values_that_miss_the_tolerance_carry_their_error():
+    """The ends of a range and an extreme inside it are stated with their error where it exceeds the tolerance."""
+    errors = np.array([1e-9, 1e-9, 0.2, 1e-9, 0.03])
+    values = [1.0, 2.0, 4.0, 3.0, 0.5]
+    table = make_table(
+        {"normal.load": np.arange(1.0, 6.0)}, {"slip_amplitude": values}, errors=errors
+    )
+    (text, *_) = make_verdict(table, analyse(table))
+    assert "from 0.500 ± 0.030 at 5 to 4.00 ± 0.20 at 3" in text
+    exact = make_table({"normal.load": np.arange(1.0, 6.0)}, {"slip_amplitude": values})
+    assert "from 0.5 at 5 to 4 at 3" in make_verdict(exact, analyse(exact))[0]
+
+
+def test_exact_peak_over_frequency_is_stated_once():
+    """A resonance over the drive frequency has its own sentence, and the range states no second estimate of it."""
+    frequency = np.linspace(90.0, 110.0, 21)
+    values = 1 / np.abs(1 - (frequency / 100.3) ** 2 + 0.04j)
+    table = make_table(
+        {"drive.frequency": frequency}, {"relative_displacement_amplitude": values}, unit="Hz"
+    )
+    analysis = analyse(table)
+    assert analysis.peaks and analysis.extremes
+    verdict = make_verdict(table, analysis)
+    assert "(largest" not in verdict[0] and "peaks at 100." in verdict[1]
+
+
 def test_exact_single_settled_case_has_no_range():
     """A sweep of which one case settled states no range and no limit, also of a measure that only unsettled cases have."""
     outcome = np.array(["steady", "transient", "transient", "transient"], object)
@@ -88,7 +114,9 @@ def test_exact_steady_estimate_of_an_unsettled_case_counts():
     table.measures["slip_amplitude_steady"].errors[3] = 60.0
     assert np.array_equal(table.select_trusted("slip_amplitude").values, [1, 4, 2, np.nan], True)
     verdict = make_verdict(table, analyse(table))
-    assert "slip amplitude changes most: from 1 at 1 to 4 at 2" in verdict[0]
+    assert (
+        "slip amplitude changes most: from 1.000 ± 0.010 at 1 to 4.000 ± 0.010 at 2" in verdict[0]
+    )
     assert "3 unsettled (of which 2 with a steady estimate that counts)" in verdict[-1]
 
     # the largest amplitude of a case that does not count is not left unsaid
@@ -174,7 +202,7 @@ def test_exact_first_sentence_names_each_main_measure():
         "relative_displacement_amplitude": x,
         "absolute_acceleration_peak": np.full(9, 2.0),
     }
-    table = make_table({"normal.load": x}, columns, errors=1e-3)
+    table = make_table({"normal.load": x}, columns, errors=9e-4)
     sentence = make_verdict(table, analyse(table))[0]
     assert sentence.startswith(
         "With normal.load, relative displacement amplitude changes most: from 1 at 1 to 5 at 5; "

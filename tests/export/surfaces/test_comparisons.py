@@ -2,6 +2,7 @@
 
 import csv
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,6 +57,15 @@ def test_exact_headline_of_each_verdict(code):
     assert 1 <= len(answer.verdict) <= 4
     assert all(re.match(r"[A-Z0-9].*[.?]$", text) for text in answer.verdict)
     assert answer.details["code"] == code
+
+
+def test_exact_sentence_says_of_how_many_tracks_it_states_the_longest():
+    """Of several worn tracks the sentence states the longest with their number, of a single one it states no number."""
+    one = compare_traces()
+    two = replace(one, tracks=(*one.tracks, *one.tracks))
+    single, longest = (compare.make_comparison_answer(found).verdict[1] for found in (one, two))
+    assert "A track from" in single and "longest" not in single
+    assert "The longest of 2 tracks, from" in longest and "of the second trace, is" in longest
 
 
 @pytest.mark.parametrize("code", FINDINGS)

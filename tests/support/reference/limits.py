@@ -104,10 +104,11 @@ complex mode shape is replaced by its real part.
 **Wear.** Every point wears by Archard's law with its own pressure and slip. Debris and heat are neglected; where debris
 carries the load, the true track is narrower and deeper. A [track in Ti-6Al-4V](../../studies/benchmarks/ti64_wear.py)
 is 2.1 times as deep and 0.53 times as wide as computed for its volume; those of five other tests are 0.54 to 0.64 times
-as wide. A layer of `[contact.asperities]` does not wear: its stiffness and decay length stay constant, and the worn
-depth is a mean over its waves. Wear changes the friction only through the table `[wear.friction]`, by the same factors
-at all points of the patch. Within each jump of wear, a rig is assumed to repeat its last computed cycle. If a face yaws,
-its slide and its wear are computed along x only; a note gives the motion of the ends of the patch across x.
+as wide. A layer of `[contact.asperities]` keeps its stiffness and decay length, and the worn depth is a mean over its
+waves; only with `hardness` do its tops lose height. They are pressed flat by the mean pressure of the unworn contact, and
+the material that this moves fills no valleys. Wear changes the friction only through the table `[wear.friction]`, by the
+same factors at all points of the patch. Within each jump of wear, a rig is assumed to repeat its last computed cycle. If
+a face yaws, its slide and its wear are computed along x only; a note gives the motion of the ends of the patch across x.
 
 **Errors.** Stated errors are estimates from coarser runs. The true numerical error is smaller than the stated error in
 about 19 of 20 scenes. Stated errors do not include what the model neglects. A step in the gap makes the pressure peak
