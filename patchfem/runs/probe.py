@@ -3,6 +3,7 @@
 In: a Plan. Out: a `Probe`, whose sentences say how the time grows with each setting.
 """
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..core import remove_interface_number
@@ -37,12 +38,14 @@ class Probe(NamedTuple):
 def run_probe(plan: Plan) -> Probe:
     """Run a plan once without error estimates and measure the time of its stages.
 
+    Of a scene with [sweep] it is the plan and the time of the first case.
+
     Raises
     ------
     PatchfemError
         If the scene cannot be run.
     """
-    result = run(plan, estimate=False)
+    result = run(replace(plan, n_cases=1), estimate=False)
     seconds = {name: round(float(value), 3) for name, value in result.seconds.items()}
     motion = seconds.get("march", seconds.get("bench", 0.0))
     stages = [f"{motion:.2g} s of it for the motion"] * bool(motion)
@@ -52,7 +55,7 @@ def run_probe(plan: Plan) -> Probe:
     # The points of a response curve are no stage of their own; the stages are those of its peak.
     total = seconds["total"]
     curve = 2 * total - sum(seconds.values())
-    if curve > total / 2:
+    if plan.engine == "harmonic" and curve > total / 2:
         motion = 0.0
         stages = [f"{curve:.2g} s of it for the response curve"]
     sentences = [", ".join([f"a run without error estimates took {total:.2g} CPU s", *stages])]

@@ -22,7 +22,7 @@ from . import joint, refine
 from .findings import find_missed_measures, mark_unbalanced
 from .patch import area_motion, faces, mesh_levels, store, strength
 from .patch import result as patch_result
-from .plan import Plan, plan, refuse_insufficient_memory
+from .plan import Plan, plan, refuse_first_case, refuse_insufficient_memory
 from .results.interfaces import Face, merge_sentences
 from .results.patch_rows import Measures, find_unknown_measures
 from .results.result import Result, RunInputs, describe_measure, shorten_file_names
@@ -97,9 +97,12 @@ def run(
         With the static patch as partial result if the motion was not found.
     Missing
         If the scene cannot be run.
+    PatchfemError
+        If the Plan is that of the first case of a table [sweep].
     """
     runnable = runnable if isinstance(runnable, Plan) else plan(runnable)
     with locate_errors(runnable.model.source):
+        refuse_first_case(runnable)
         refuse_insufficient_memory(runnable, say)
         if fresh:
             store.clear_cache()

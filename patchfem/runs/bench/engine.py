@@ -5,6 +5,7 @@ parallel elements obey Masing's rules; contact points and lists of bonds use the
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import ceil
 from typing import NamedTuple
 
@@ -172,6 +173,7 @@ class BenchSizes(NamedTuple):
     samples: int
 
 
+@lru_cache(8)
 def count_bench_sizes(model) -> BenchSizes:
     """Count the unknowns and the samples of a bench run."""
     steps = steps_per_cycle(model)
