@@ -110,7 +110,7 @@ def _extract_partial_result(error: NotConverged) -> Result:
             f"{error}; the run stopped before any result, so there is no results folder"
         ) from None
     reason = shorten_file_names([str(error)], result.plan.model.source.path)
-    return replace(result, warnings=[*reason, *result.warnings])
+    return result.with_changes(warnings=[*reason, *result.warnings])
 
 
 def saves_state(run_plan: Plan) -> bool:
@@ -180,8 +180,7 @@ def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
     `face` has the patch and the fields of the interface. The folder is made.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    face_result = replace(
-        result,
+    face_result = result.with_changes(
         plan=replace(result.plan, model=face.model),
         patch=face.patch,
         fields=face.fields,

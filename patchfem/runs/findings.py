@@ -9,7 +9,6 @@ runs of its error estimate.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from math import ceil, floor, inf, log2, log10
 from typing import NamedTuple
 
@@ -368,8 +367,7 @@ def mark_unbalanced(result: Result) -> Result:
     warnings = [*_check_load(result), *_check_energy(result)]
     if not warnings:
         return result
-    return replace(
-        result,
+    return result.with_changes(
         outcome=Outcome.NOT_CONVERGED,
         measures=run_measures.outcome.remove_errors(result.measures),
         warnings=[*warnings, *result.warnings],

@@ -25,7 +25,7 @@ from .patch import result as patch_result
 from .plan import Plan, plan, refuse_first_case, refuse_insufficient_memory
 from .results.interfaces import Face, merge_sentences
 from .results.patch_rows import Measures, find_unknown_measures
-from .results.result import Result, RunInputs, describe_measure, shorten_file_names
+from .results.result import Result, RunInputs, Statements, describe_measure, shorten_file_names
 from .rig import engines, rig
 from .wear import evolve, measures
 
@@ -114,7 +114,7 @@ def run(
         passes = _Passes(runnable, refine.RunControl(limit, say, progress, estimate), state_file)
         done, shortage = refine.refine(passes.solve, runnable.model, passes.judge, limit, say)
         if shortage is not None:
-            done = done._replace(result=replace(done.result, shortage=shortage))
+            done = done._replace(result=done.result.with_changes(shortage=shortage))
         done.result.seconds["total"] = process_time() - start
         return _complete_result(done)
 
@@ -343,8 +343,10 @@ def _make_result_without_load(inputs: RunInputs) -> Result:
         outcome=Outcome.NO_CONTACT,
         measures={"normal_load": Measure(0.0, "N", 0.0)},
         seconds=inputs.seconds,
-        warnings=[*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_NO_MOTION_MESSAGE],
-        notes=inputs.notes,
+        statements=Statements(
+            [*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_NO_MOTION_MESSAGE],
+            inputs.notes,
+        ),
     )
 
 
@@ -416,8 +418,7 @@ def _complete_result(done: FinishedPass) -> Result:
     for name, measure in result.measures.items():
         described[name] = replace(measure, text=describe_measure(name, part))
 
-    return replace(
-        result,
+    return result.with_changes(
         outcome=outcome,
         patch=patch,
         measures=described,

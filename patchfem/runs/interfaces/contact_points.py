@@ -58,7 +58,7 @@ def make_contact(model: Model, numerics, patch) -> contacts.Contact:
         None under [normal] and between masses.
     """
     rig = model.rig
-    joints = list_joints(model, patch, numerics.meshed)
+    joints = list_joints(model, patch, numerics.space.meshed)
     fields = _find_load(model, patch) if joints else {}
 
     # Parallel elements represent an interface exactly under a constant load; its nodes or shear modes serve all other
@@ -210,7 +210,7 @@ def make_points(joint: Joint, numerics, *, moves: bool = False) -> PointSet:
         # A single point on a prescribed slide takes little time.
         is_cheap = joint.row.size == 0 and np.size(load) == 1
         n_cells = laws.N_CELLS * (CELLS_FACTOR if is_cheap else 1)
-        n_cells = n_cells // 2 if numerics.has_half_cells else n_cells
+        n_cells = n_cells // 2 if numerics.space.has_half_cells else n_cells
         points = laws.make_iwan(law, np.maximum(load, MIN_LOAD), n_cells)
     elif limits is None:
         points = laws.make_point_law(keys.law, law, load, rest)
@@ -279,7 +279,7 @@ def _choose_modes(joint: Joint, law, numerics, *, moves: bool) -> shear_modes.Sh
     force = joint.node_loads
     accuracy = joint.model.accuracy
     bound = SHEAR_MODES_ERROR_RATIO * accuracy.tolerance
-    count = numerics.shear_modes or accuracy.shear_modes
+    count = numerics.space.shear_modes or accuracy.shear_modes
     is_below = patch.model.gap.side == "lower" and joint.model.grooves is None
     most = MAX_STIFF_MODES if keys.law in laws.STIFF_LAWS else MAX_MODES
 

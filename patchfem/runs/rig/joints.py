@@ -96,7 +96,7 @@ def make_joints(model: Model, numerics, patch) -> Joints:
     patch : Patch or None
         None without [contact].
     """
-    joints = list_parts(model, patch, numerics.meshed)
+    joints = list_parts(model, patch, numerics.space.meshed)
     pairs = []
     lengths = []
     for joint in joints:
@@ -143,7 +143,7 @@ def make_undriven_rig(model: Model, numerics, patch) -> UndrivenRig:
     PatchfemError
         If a law has no steady loop.
     """
-    joints = list_parts(model, patch, numerics.meshed)
+    joints = list_parts(model, patch, numerics.space.meshed)
     for joint in joints:
         if joint.is_soft and joint.elements is None:
             raise PatchfemError(NO_SOFT_LOOP)

@@ -224,7 +224,7 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
         return
     slides = run.solution.run.window.slides.T
-    parts = joints.list_parts(run.model, run.patch, run.numerics.meshed)
+    parts = joints.list_parts(run.model, run.patch, run.numerics.space.meshed)
     for joint, slide in zip(parts, slides):
         _, yields = joint.list_elements()
         largest_yield = float(yields.max(initial=0.0))

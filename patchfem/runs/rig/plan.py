@@ -96,7 +96,7 @@ def count_unknowns(model: Model) -> dict[str, int]:
     has_bonds = model.grooves is None and law_has_trait(f.law, "bonds")
     is_changed = has_bonds or model.grooves is not None or model.rig.friction.load_varies
     if is_changed and not (has_bonds and bond_lists.has_bond_list(model)):
-        counts["shear_modes"] = numerics.shear_modes or partial_slip.shear_modes.N_SHEAR_MODES
+        counts["shear_modes"] = numerics.space.shear_modes or partial_slip.shear_modes.N_SHEAR_MODES
     return counts
 
 
