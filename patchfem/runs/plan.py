@@ -209,7 +209,7 @@ def _make_plan(model: Model) -> Plan:
         engine = engines.choose_engine(model).name
         chain = of_rig.structure_stiffnesses(rig) | chain
         groups = of_rig.compute_dimensionless_groups(model) if model.kind == "rig" else {}
-        unknowns |= of_rig.count_unknowns(model)
+        unknowns["modes"] = len(rig.structure.frequencies)
         sentences += engines.describe_unused_settings(model, engine)
     elif model.moves:
         sizes = of_bench.count_bench_sizes(model)

@@ -1,6 +1,6 @@
 """Probe of a plan: one run without error estimates, with its measured time.
 
-In: a Plan. Out: a `Probe`, whose sentences say how the time grows with each setting.
+In: a Plan. Out: a `MeasuredPlan`, whose sentences say how the time grows with each setting.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ DOUBLED_CELLS_TIME_RATIO = 5
 HALF_ELEMENT_SIZE_TIME_RATIO = 5
 
 
-class Probe(NamedTuple):
+class MeasuredPlan(NamedTuple):
     """Measured time of a run without error estimates.
 
     - seconds: CPU seconds by stage, and "total".
@@ -35,7 +35,7 @@ class Probe(NamedTuple):
         return self.static | {"seconds": self.seconds, "sentences": list(self.sentences)}
 
 
-def run_probe(plan: Plan) -> Probe:
+def run_probe(plan: Plan) -> MeasuredPlan:
     """Run a plan once without error estimates and measure the time of its stages.
 
     Of a scene with [sweep] it is the plan and the time of the first case.
@@ -66,7 +66,7 @@ def run_probe(plan: Plan) -> Probe:
         row = PATCH_TABLE.get(remove_interface_number(name))
         if row is not None and row.group == "patch":
             static[name] = measure.value
-    return Probe(seconds, static, tuple(sentences))
+    return MeasuredPlan(seconds, static, tuple(sentences))
 
 
 def _describe_factors(plan: Plan, *, has_motion: bool, has_contact: bool) -> list[str]:

@@ -60,7 +60,7 @@ class Advice(NamedTuple):
         return cls(f"set {key} = {value}", key, value)
 
 
-class Finding(NamedTuple):
+class AccuracyFinding(NamedTuple):
     """What a run found about the accuracy of its measures.
 
     - words: sentence without the advice.
@@ -94,7 +94,7 @@ class RunInputs:
     """Inputs of a run: plan, pressed interfaces, and the limits and callbacks of its caller.
 
     - plan: Plan to run.
-    - faces: pressed interfaces (`interfaces.Face`), with their worn surfaces.
+    - faces: pressed interfaces (`interfaces.PressedFace`), with their worn surfaces.
     - seconds: CPU seconds by step of the run; the run adds its own.
     - warnings, notes: sentences on the scene and the patch.
     - control: `refine.RunControl`, what the caller has set.
@@ -181,7 +181,7 @@ class MotionData(NamedTuple):
     - settings: Settings.
     - energies: energies [J] and counters by name.
     - step_runs: `errors.StepRun` of the run and of its runs with fewer steps, from fine to coarse.
-    - levels: `events.Level` of each drive level.
+    - levels: `events.DriveLevel` of each drive level.
     - events: stick-slip Events.
     - decay: DecayCurve of a release.
     - spectra: Spectra under a random drive.
@@ -191,7 +191,7 @@ class MotionData(NamedTuple):
     settings: Settings = Settings()
     energies: Values = MappingProxyType({})
     step_runs: "tuple[run_measures.errors.StepRun, ...]" = ()
-    levels: "tuple[run_measures.events.Level, ...]" = ()
+    levels: "tuple[run_measures.events.DriveLevel, ...]" = ()
     events: "run_measures.events.Events | None" = None
     decay: "run_measures.decay_curve.DecayCurve | None" = None
     spectra: "run_measures.stationary.Spectra | None" = None
@@ -228,7 +228,7 @@ class ContactData(NamedTuple):
 
     - patch: solved patch, or None.
     - fields: arrays (frame, x) by name, with `time`.
-    - faces: interfaces of a rig that have a patch of their own (`interfaces.Face`), with their fields.
+    - faces: interfaces of a rig that have a patch of their own (`interfaces.PressedFace`), with their fields.
     - wear: WornStates of the patch, or None.
     """
 
@@ -242,14 +242,14 @@ class Statements(NamedTuple):
     """What a run says in words.
 
     - warnings, notes: sentences.
-    - findings: `Finding`s on measures that miss the tolerance; `warnings` has their sentences.
+    - findings: `AccuracyFinding`s on measures that miss the tolerance; `warnings` has their sentences.
     - yielding_faces: notes on surfaces that yield under the peak pressure, by Strength.
     - shortage: Shortage if accuracy.max_seconds or accuracy.max_memory ended the refinement, else None.
     """
 
     warnings: list[str]
     notes: list[str]
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[AccuracyFinding, ...] = ()
     yielding_faces: dict = MappingProxyType({})
     shortage: Shortage | None = None
 
