@@ -299,6 +299,7 @@ def _describe_grooves(model: Model) -> list[str]:
 
 # ---- memory of a run
 
+NEGLIGIBLE_BYTES = 50e6  # memory of a run beside that of the program which always fits
 BYTES_PER_STATIC_NODE = 4.6e3  # per node of the pieces of a static patch, to condense them
 BYTES_PER_MOVING_NODE = 8.1e3  # the same, with the frames of a motion
 BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide
@@ -472,12 +473,15 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     Missing
         With the largest contribution and its remedy.
     """
-    # A run that fits into what is free and allowed goes on without a word.
+    # A run that fits into what is free and allowed goes on without a word; one that hardly needs more than the program that
+    # asks for it fits, and the free memory is not looked up.
     parts = list_memory_parts(plan)
     total = sum(part.bytes for part in parts)
-    free = free_bytes()
     given = plan.model.accuracy.max_memory
     allowed = given or refine.DEFAULT_MAX_BYTES
+    if total <= min(refine.PROGRAM_BYTES + NEGLIGIBLE_BYTES, allowed):
+        return
+    free = free_bytes()
     if total <= min(free, allowed):
         return
 
