@@ -270,7 +270,7 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     """Choose the engine of a run, and count its unknowns, without solving anything.
 
-    The plan of a scene with a table [sweep] is that of its first case.
+    The plan of a scene with a table [sweep] is that of its first case, which `run` refuses.
 
     Parameters
     ----------

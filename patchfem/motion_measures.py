@@ -2,12 +2,19 @@
 
 In: `Observations` of one run or of many, energies, or samples. Out: values by name, NaN where a run does not have the
 measure. `measures.rows` has the names, units and definitions of the measures.
+
+An interface sticks while less than STICKING_SLIP_FRACTION of the change of its relative displacement is irreversible. Three
+observers add up the time of stick and the starts of slip: `event_driven.window_kernels.add_stick` over the steps of this
+engine, `points.observer_kernels.observe_motion` in sweeps, and `measures.measures.observe_stick` over samples. All measures
+of stick follow from these sums by `measure_stick`.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+# Irreversible part of a change of the relative displacement from which an interface slips; kernels use it too.
+STICKING_SLIP_FRACTION = 0.5
 FULL_STICK = 1e-12  # fraction by which a time of stick may miss the whole window, or no time at all
 MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which there is no distortion
 MAX_RESTING_SLIDE_RANGE = 1e-15  # largest range of the slide [m] of an interface at rest
@@ -46,15 +53,11 @@ def measure_interface(observations: Observations, stiffness) -> Values:
 
     `stiffness` is that of the first mode at the contact [N/m], 0 if no damping is computed.
     """
-    # A reversal without stick takes a time of the size of round-off.
-    stuck = observations.stick[0] / observations.span
-    nearest = np.round(stuck)
     values = {
         "slip_amplitude": np.ptp(observations.slip, axis=-1) / 2,
-        "stick_fraction": np.where(np.abs(stuck - nearest) <= FULL_STICK, nearest, stuck),
         "friction_force_peak": np.abs(observations.force).max(axis=-1),
-        "slip_start_phase": mean_slip_phase(*observations.stick[1:]),
     }
+    values |= measure_stick(observations.stick, observations.span)
     area = observations.work * observations.period / observations.span
     values |= measure_loop(observations.cycles[..., 1:], *observations.harmonics, area, stiffness)
 
@@ -68,23 +71,29 @@ def measure_interface(observations: Observations, stiffness) -> Values:
     return values
 
 
-def mean_slip_phase(count, cosine, sine):
-    """Return the mean phase [rad], modulo pi, at which slip begins, for one run or for (n,) runs.
+def measure_stick(stick, span) -> Values:
+    """Return the fraction of stick [1] and the mean phase [rad], modulo pi, at which slip starts after stick.
 
-    It is NaN if there is no onset, and if the onsets differ by more than MIN_ALIGNMENT allows: the
-    mean of several slip phases in a half cycle is the phase of none.
+    The phase is NaN if there is no start, and if the starts differ by more than MIN_ALIGNMENT allows: the mean of several
+    phases in a half cycle is the phase of none.
 
     Parameters
     ----------
-    count, cosine, sine : array_like
-        Number of slip onsets, and sums of cosine and sine of twice their phases.
-
-    Returns
-    -------
-    array_like
+    stick : (4, ...) array_like
+        Time of stick [s], number of starts of slip, and sums of cosine and sine of twice their phases.
+    span : float or (...)
+        Time in which they were observed [s].
     """
+    time, count, cosine, sine = stick
+    # A reversal without stick takes a time of the size of round-off.
+    fraction = time / span
+    nearest = np.round(fraction)
     have_common_phase = (count > 0) & (np.hypot(cosine, sine) >= MIN_ALIGNMENT * count)
-    return np.where(have_common_phase, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)[()]
+    phase = np.where(have_common_phase, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)
+    return {
+        "stick_fraction": np.where(np.abs(fraction - nearest) <= FULL_STICK, nearest, fraction)[()],
+        "slip_start_phase": phase[()],
+    }
 
 
 def measure_loop(reversals, slide, force, work, stiffness) -> Values:

@@ -12,7 +12,7 @@ from .shared import Json, flag_option, note, repeated_option, required_out_optio
 
 
 @dataclass(frozen=True)
-class EstimateOptions:
+class EstimateArguments:
     """Options of the identification of modes."""
 
     band: text_option('frequency band in which to find modes, such as "20 Hz..400 Hz"') = ""
@@ -42,7 +42,7 @@ def import_(
     zero: flag_option(
         "subtract the time and the displacement of the first row from all rows"
     ) = False,
-    modes: Annotated[EstimateOptions, Parameter(name="*")] = EstimateOptions(),
+    modes: Annotated[EstimateArguments, Parameter(name="*")] = EstimateArguments(),
     json_: Json = False,
 ):
     """Convert a laboratory file into a table or into the modes of a scene. The table can be used as `drive.file`, as

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from .. import __version__
 
 
-class Source(NamedTuple):
+class Publication(NamedTuple):
     """Entry of the bibliography: its BibTeX text, its fields by name, and the effects that it describes."""
 
     text: str
@@ -20,14 +20,16 @@ class Source(NamedTuple):
     effects: tuple[str, ...]
 
 
-def read_sources() -> list[Source]:
+def read_sources() -> list[Publication]:
     """Return all entries of the bibliography."""
     bibliography = (files(__package__) / "sources.bib").read_text("utf-8")
     sources = []
     for text in bibliography.replace("VERSION", __version__).split("\n\n"):
         fields = dict(re.findall(r"^  (\w+) = \{(.*)\},?$", text, re.MULTILINE))
         effects = fields.get("keywords", "")
-        sources.append(Source(text.strip(), fields, tuple(effects.split(", ") if effects else ())))
+        sources.append(
+            Publication(text.strip(), fields, tuple(effects.split(", ") if effects else ()))
+        )
     return sources
 
 

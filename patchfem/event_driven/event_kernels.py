@@ -10,6 +10,7 @@ import numpy as np
 
 from ..kernel_cache.flags_kernels import NJIT_KERNEL
 from ..kernel_cache.jit import njit
+from ..motion_measures import STICKING_SLIP_FRACTION
 from .motion_kernels import (
     copy_values,
     find_drive,
@@ -182,7 +183,8 @@ def write_probes(rig, state, t, y, probes):
         probes[first + Probe.LOAD] = max(point.load, 0.0)
         if i == 0:
             probes[Probe.VELOCITY] = point.velocity
-        slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
+        sticking_rate = STICKING_SLIP_FRACTION * abs(point.velocity)
+        slipping = abs(memory[Memory.SLIP_RATE]) - sticking_rate
         is_still = rests(memory) or abs(point.velocity) <= slowest * point.speed_scale
         probes[Probe.SLIPPING - i] = -1.0 if is_still else slipping
 

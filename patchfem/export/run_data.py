@@ -117,7 +117,7 @@ def _collect_loop(result: Result) -> Variables:
         force = window.forces.T
 
     # the window may have several cycles
-    period = result.motion.period
+    period = result.histories.period
     if period and result.plan.kind != "bench":
         keep = window.time >= window.time[-1] - period * (1 + 1e-9)
         slide = slide[..., keep]

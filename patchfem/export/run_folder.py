@@ -9,7 +9,7 @@ from typing import NamedTuple
 from .. import __version__
 from ..core import NotConverged, PatchfemError
 from ..runs.plan import Plan
-from ..runs.results.interfaces import Face
+from ..runs.results.interfaces import PressedFace
 from ..runs.results.result import Result, shorten_file_names
 from ..runs.run import StateFile, is_march, run
 from . import page, store
@@ -110,7 +110,7 @@ def _extract_partial_result(error: NotConverged) -> Result:
             f"{error}; the run stopped before any result, so there is no results folder"
         ) from None
     reason = shorten_file_names([str(error)], result.plan.model.source.path)
-    return replace(result, warnings=[*reason, *result.warnings])
+    return result.with_changes(warnings=[*reason, *result.warnings])
 
 
 def saves_state(run_plan: Plan) -> bool:
@@ -174,14 +174,13 @@ def write_results(result: Result, folder: Path, case: dict[str, str] | None = No
     return answer
 
 
-def _write_face(result: Result, face: Face, folder: Path) -> list[str]:
+def _write_face(result: Result, face: PressedFace, folder: Path) -> list[str]:
     """Write the fields of one interface of a run into a folder of its own, and return notes on them.
 
     `face` has the patch and the fields of the interface. The folder is made.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    face_result = replace(
-        result,
+    face_result = result.with_changes(
         plan=replace(result.plan, model=face.model),
         patch=face.patch,
         fields=face.fields,

@@ -448,7 +448,8 @@ def describe_rest(time, output, error: float = 0.0, last_amplitude: float | None
     error : float
         Error of the amplitude [m]; an output that moves by no more is at rest.
     last_amplitude : float, optional
-        Amplitude of the last whole cycle [m]; by default that of the last tenth of the samples.
+        Measured amplitude of the last whole cycle [m], which the sentence states; by default that of the last tenth of the
+        samples, in which the output may come to rest.
     """
     largest = np.abs(output).max()
     end = 0.0 if abs(output[-1]) < ZERO_POSITION_FRACTION * largest else output[-1]
@@ -456,9 +457,9 @@ def describe_rest(time, output, error: float = 0.0, last_amplitude: float | None
     # rest
     rest_limit = max(error, 5e-3 * abs(end), ZERO_POSITION_FRACTION * largest)
     last_tenth = time >= time[-1] - 0.1 * (time[-1] - time[0])
-    amplitude = np.ptp(output[last_tenth]) / 2
-    amplitude = amplitude if last_amplitude is None else min(last_amplitude, amplitude)
-    if amplitude > rest_limit:
+    end_amplitude = np.ptp(output[last_tenth]) / 2
+    amplitude = end_amplitude if last_amplitude is None else last_amplitude
+    if min(amplitude, end_amplitude) > rest_limit:
         end_time = format_quantity(time[-1], "s", 3)
         return f"still moves with an amplitude of {format_length(amplitude, 3)} after {end_time}"
 

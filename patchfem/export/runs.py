@@ -144,7 +144,7 @@ def make_details(result: Result) -> JsonObject:
 def count_cycles(result: Result) -> float | None:
     """Return the number of cycles of the drive or of the slide in a run, or None if it has none."""
     response = result.response
-    period = result.motion.period
+    period = result.histories.period
     if response is not None and period and result.plan.kind != "bench":
         return (response.time[-1] - response.time[0]) / period
     return tomllib.loads(result.plan.model.source.resolved).get("slide", {}).get("cycles")

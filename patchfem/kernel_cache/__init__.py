@@ -47,11 +47,12 @@ PUBLIC = {
 }
 
 PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
-# Modules of tuples that kernels take and of row numbers; they belong to the hash because the
+# Modules of tuples that kernels take, of row numbers and of constants; they belong to the hash because the
 # machine code depends on the order of the fields and on the numbers.
 TUPLE_MODULES = (
     "contact/set_arrays.py",
     "event_driven/records.py",
+    "motion_measures.py",
     "points/rows.py",
 )
 CACHE_FOLDER_PATTERN = re.compile(r"[0-9a-f]{16}")

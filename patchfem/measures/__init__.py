@@ -10,7 +10,7 @@ functions that evaluate samples.
 PUBLIC = {
     "decay_curve": ("DecayCurve", "fit_decay_curve", "locate_reversals", "make_half_cycles"),
     "errors": ("ERROR_MEASURES", "estimate_convergence_errors"),
-    "events": ("EVENT_KIND_NAMES", "Level", "bracket_onset", "make_onset_test"),
+    "events": ("EVENT_KIND_NAMES", "DriveLevel", "bracket_onset", "make_onset_test"),
     "measures": ("compute_step_harmonic",),
     "reasons": ("STICKS_AT_REVERSAL_REASON", "find_invalid"),
     "rows": (

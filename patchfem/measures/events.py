@@ -1,6 +1,6 @@
 """Events and free vibration of a rig in stick and slip, and the drive level at which slip begins.
 
-In: event rows of an engine, the window of a run, or a `Level` for each drive level in chronological order. Out: the
+In: event rows of an engine, the window of a run, or a `DriveLevel` for each drive level in chronological order. Out: the
 stick-slip `Events`, whether interfaces stick, the `VibratingMode`s of a rig whose interfaces all stick, which are
 eigenvectors of the rig with its interfaces as springs, and the two levels that bracket the onset of slip.
 """
@@ -174,7 +174,7 @@ MIN_SLIP_DISTORTION = 0.03
 
 
 @array_dataclass
-class Level:
+class DriveLevel:
     """Measures and state of a run at the end of one drive level.
 
     - drive: acceleration amplitude [m s-2]; for a force drive, force over modal mass [m s-2] or force
@@ -191,7 +191,7 @@ class Level:
     unit: str = "m s-2"
 
 
-def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level], bool]:
+def make_onset_test(kind: str, length: float | None = None) -> Callable[[DriveLevel], bool]:
     """Return a function that decides whether a drive level lies above the onset of slip.
 
     Parameters
@@ -224,14 +224,14 @@ def make_no_onset_reason(kind: str, length: float | None = None) -> str:
     return f"no level of the increasing sequence {event}"
 
 
-def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple[int, int] | None:
+def bracket_onset(levels, is_above_onset: Callable[[DriveLevel], bool]) -> tuple[int, int] | None:
     """Return the indices of the drive levels just below and just above the onset of slip.
 
     Only the levels before the first decrease are considered.
 
     Parameters
     ----------
-    levels : sequence of Level
+    levels : sequence of DriveLevel
         Levels in chronological order.
     is_above_onset : callable
         Function that returns whether a level lies above the onset.

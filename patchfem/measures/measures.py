@@ -11,7 +11,8 @@ from ..core import Measure, Response, add_interface_number, max_abs
 from ..motion_measures import (
     MAX_RESTING_SLIDE_RANGE,
     MIN_ENERGY_DIFFERENCE,
-    mean_slip_phase,
+    STICKING_SLIP_FRACTION,
+    measure_stick,
     ratio_or_zero,
 )
 
@@ -19,8 +20,6 @@ Values = dict[str, float]  # values of measures or their errors by name, in SI u
 Measures = dict[str, Measure]  # by name
 ArrayPair = tuple[np.ndarray, np.ndarray]  # two arrays of one shape
 
-# Largest irreversible fraction of a change of displacement at which an interface counts as stuck.
-MAX_STICKING_SLIP_FRACTION = 0.5
 MODAL_COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
 # Round-off error of the friction work, relative to the energy that is exchanged and stored in the
 # run.
@@ -93,12 +92,8 @@ def compute_step_harmonic(time, means, omega) -> complex:
     return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(phase_factor)) / (-1j * omega))
 
 
-def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Values:
+def compute_slip_measures(window: Response, drive, slide_round_off: float = 0.0) -> Values:
     """Return slip amplitude [m], stick fraction [1] and phase of slip onset [rad].
-
-    The interface sticks while less than MAX_STICKING_SLIP_FRACTION of the change of its relative displacement is
-    irreversible, or while it is at rest. The transition time is interpolated linearly between the
-    midpoints of the steps. The phase, modulo pi, is that of the start of slip after stick.
 
     Parameters
     ----------
@@ -106,8 +101,8 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
         Samples, equally many in each cycle.
     drive
         Drive with `period` [s].
-    steps_per_cycle : int
-        Number of samples per cycle.
+    slide_round_off : float
+        Largest half range of the slip that is round-off [m].
     """
     if interpolate_range(window.slide)[0] <= MAX_RESTING_SLIDE_RANGE:
         # The slip of a law without stiffness changes with its traction, even at constant displacement.
@@ -116,51 +111,60 @@ def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> Valu
     slip = window.slip
     amplitude = interpolate_range(slip)[0] / 2
     # A single sample, or a slip within round-off, counts as stick.
-    if slip.size < 2 or 2 * amplitude <= estimate_slip_round_off(window):
+    round_off = max(estimate_slip_round_off(window), slide_round_off)
+    if slip.size < 2 or amplitude <= round_off:
         return {"slip_amplitude": amplitude, "stick_fraction": 1.0}
 
-    # Excess of the ratio slip/displacement of each step. A step at rest counts as a step without slip.
+    steps_per_cycle = max(1, round((window.time.size - 1) * drive.period / window.span))
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
-    last_cycles = slice(-min(slip.size, cycles * steps_per_cycle + 1), None)
-    slip_steps = np.abs(np.diff(slip[last_cycles]))
-    slide_steps = np.abs(np.diff(window.slide[last_cycles]))
-    time = window.time[last_cycles]
-    is_moving = slide_steps > MODAL_COORDINATE_ROUND_OFF * max_abs(window.slide)
-    ratio = np.divide(slip_steps, slide_steps, out=np.zeros(time.size - 1), where=is_moving)
-    excess = ratio - MAX_STICKING_SLIP_FRACTION
+    last_cycles = window.select(slice(-min(slip.size, cycles * steps_per_cycle + 1), None))
+    stick, span = observe_stick(last_cycles, 2 * np.pi / drive.period)
+    values = {name: float(value) for name, value in measure_stick(stick, span).items()}
+    if np.isnan(values["slip_start_phase"]):
+        del values["slip_start_phase"]
+    return {"slip_amplitude": amplitude} | values
 
-    # The excess is known at the midpoints of the steps and linear in between.
+
+def observe_stick(window: Response, omega: float) -> tuple[np.ndarray, float]:
+    """Return sums (4,) over the stick of an interface for `motion_measures.measure_stick`, and their time span [s].
+
+    The irreversible part of the motion is known at the midpoints of the steps, and is linear in between. A step at rest
+    counts as one without slip.
+
+    Parameters
+    ----------
+    window : Response
+        Samples of whole cycles.
+    omega : float
+        Angular frequency of the drive [rad/s].
+    """
+    slip_steps = np.abs(np.diff(window.slip))
+    slide_steps = np.abs(np.diff(window.slide))
+    is_moving = slide_steps > MODAL_COORDINATE_ROUND_OFF * max_abs(window.slide)
+    ratio = np.divide(slip_steps, slide_steps, out=np.zeros(slip_steps.size), where=is_moving)
+    excess = ratio - STICKING_SLIP_FRACTION
+    if excess.size == 1:
+        return np.array([float(excess[0] < 0), 0.0, 0.0, 0.0]), 1.0
+
+    # Fraction of the time between two midpoints in which the interface sticks
     before = excess[:-1]
     after = excess[1:]
-    middles = (time[1:] + time[:-1]) / 2
-    stick_fraction = float(excess[0] < 0)
-    if before.size:
-        size = np.maximum(np.abs(before) + np.abs(after), 1e-300)
-        changes = before * after < 0
-        below = np.where(changes, -np.minimum(before, after) / size, np.minimum(before, after) < 0)
-        stick_fraction = float(np.average(below, weights=np.diff(middles)))
-    measures = {"slip_amplitude": amplitude, "stick_fraction": stick_fraction}
+    middles = (window.time[1:] + window.time[:-1]) / 2
+    size = np.maximum(np.abs(before) + np.abs(after), 1e-300)
+    changes = before * after < 0
+    below = np.where(changes, -np.minimum(before, after) / size, np.minimum(before, after) < 0)
+    durations = np.diff(middles)
 
-    onsets = np.flatnonzero((before < 0) & (after >= 0))
-    if onsets.size:
-        rise = (after - before)[onsets]
-        onset_times = middles[onsets] - before[onsets] / rise * np.diff(middles)[onsets]
-        measures |= average_slip_starts(2 * np.pi / drive.period * onset_times)
-    return measures
+    starts = np.flatnonzero((before < 0) & (after >= 0))
+    rise = (after - before)[starts]
+    phases = omega * (middles[starts] - before[starts] / rise * durations[starts])
+    stick = (below @ durations, starts.size, np.cos(2 * phases).sum(), np.sin(2 * phases).sum())
+    return np.array(stick), float(durations.sum())
 
 
 def estimate_slip_round_off(window: Response) -> float:
     """Return the slip [m] in the window of a run that may be round-off of the modal coordinates."""
     return MODAL_COORDINATE_ROUND_OFF * max_abs(window.modal)
-
-
-def average_slip_starts(phases) -> Values:
-    """Return the mean of the drive phases (k,) [rad] at which slip starts, by the name of this measure.
-
-    The dict is empty if the phases differ.
-    """
-    phase = mean_slip_phase(len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum())
-    return {} if np.isnan(phase) else {"slip_start_phase": float(phase)}
 
 
 def compute_ledger_measures(ledger) -> Values:

@@ -21,6 +21,7 @@ from ..core import (
 )
 from ..motion_measures import MAX_RESTING_SLIDE_RANGE, energy_balance, ratio_or_zero
 from . import stationary
+from .decay_curve import measure_last_cycle_amplitude
 from .loops import (
     compute_mean_drift,
     find_reversals,
@@ -57,7 +58,8 @@ class LastCycles:
       `loops.find_reversals`).
     - slide_round_off: largest half range of the relative displacement that is round-off [m].
     - is_single_interface: whether the columns `slides` of the window are bands of a single interface.
-    - release: amplitude of the last whole cycle of a release [m]; None for other drives and without such a cycle.
+    - release: histories of the whole run of a release, whose last whole cycle may begin before the window; None for other
+      drives.
     """
 
     window: Response
@@ -73,7 +75,7 @@ class LastCycles:
     reversal_rule: str = "rate"
     slide_round_off: float = 0.0
     is_single_interface: bool = False
-    release: float | None = None
+    release: Response | None = None
 
     @cached_property
     def span(self) -> float:
@@ -85,9 +87,7 @@ class LastCycles:
         """Slip amplitude [m], stick fraction [1] and phase of slip onset [rad] as a dict."""
         if self.load is None:
             return {}
-        window = self.window
-        steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-        return compute_slip_measures(window, self.drive, steps)
+        return compute_slip_measures(self.window, self.drive, self.slide_round_off)
 
     @cached_property
     def reversals(self) -> np.ndarray:
@@ -192,13 +192,36 @@ def _find_drift_scale(values: Values):
     return np.where(slip > 0, slip, np.abs(values.get(AMPLITUDE, 0.0)))
 
 
+def measure_amplitude(
+    extremes: np.ndarray, release: Response | None = None, period: float = np.inf
+) -> float:
+    """Return the measure AMPLITUDE [m]: half the peak-to-peak displacement at the output.
+
+    Of a release it is that of the last whole cycle, if there is one.
+
+    Parameters
+    ----------
+    extremes : (c, 2) array
+        Smallest and largest output in the last cycles [m].
+    release : Response or None
+        Histories of the whole run of a release; None for other drives.
+    period : float
+        Period of the drive, or of the first mode of a release [s].
+    """
+    amplitude = None
+    if release is not None:
+        motion = (release.time, release.output, release.output_rate)
+        amplitude = measure_last_cycle_amplitude(*motion, period)
+    return float(np.ptp(extremes)) / 2 if amplitude is None else amplitude
+
+
 AMPLITUDE = "relative_displacement_amplitude"  # measure on which a run is refined
 STICK_FRACTION = "stick_fraction"
 SLIP_START_PHASE = "slip_start_phase"
 STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"  # the same, extrapolated
 # Functions of a LastCycles that return the measures which are not in one of its groups of values
 FUNCTIONS = {
-    AMPLITUDE: lambda s: np.ptp(s.extremes) / 2 if s.release is None else s.release,
+    AMPLITUDE: lambda s: measure_amplitude(s.extremes, s.release, s.drive.period),
     "absolute_acceleration_peak": lambda s: compute_peak(s.window.acceleration),
     "friction_force_peak": lambda s: None if s.load is None else compute_peak(s.window.force),
     "energy_balance": lambda s: energy_balance(s.run_energies),
@@ -262,6 +285,9 @@ def compute_measures(last_cycles: LastCycles) -> Values:
     interface after the name. A value that the engine integrated replaces the value from samples.
     """
     known = last_cycles.integrated
+    if last_cycles.release is not None:
+        # The amplitude that an engine integrates is that of the window.
+        known = {name: value for name, value in known.items() if name != AMPLITUDE}
     values = {}
     for row in MOTION_TABLE.values():
         if row.name in known:

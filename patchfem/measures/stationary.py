@@ -32,7 +32,7 @@ MIN_RECORD_DECAY_TIMES = 50.0
 MIN_SEGMENT_SAMPLES = 64  # Smallest number of samples of a segment.
 
 
-class Record(NamedTuple):
+class StationaryRecord(NamedTuple):
     """Equally spaced samples of drive and output under a random drive.
 
     - step: time step [s].
@@ -66,7 +66,7 @@ class Spectra(NamedTuple):
     coherence: np.ndarray
 
 
-def make_record(window, drive) -> Record:
+def make_record(window, drive) -> StationaryRecord:
     """Return equally spaced samples of drive and output in a window.
 
     The displacement is interpolated by cubics through positions and rates.
@@ -76,7 +76,7 @@ def make_record(window, drive) -> Record:
     step = float(drive.time[1])
     grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step * (1 + 1e-12)))
     displacement = CubicHermiteSpline(time, window.output[is_new], window.output_rate[is_new])(grid)
-    return Record(
+    return StationaryRecord(
         step, drive.values(grid), displacement, np.interp(grid, time, window.acceleration[is_new])
     )
 
@@ -211,7 +211,7 @@ def is_stationary(window, drive) -> bool:
     )
 
 
-def transform_record(record: Record) -> Segments:
+def transform_record(record: StationaryRecord) -> Segments:
     """Return the Fourier transforms of drive, displacement and acceleration of a record, in overlapping segments."""
     size = max(
         min(MIN_SEGMENT_SAMPLES, record.displacement.size),
@@ -240,12 +240,12 @@ def compute_spectra(window, drive) -> Spectra:
     )
 
 
-def fit_peak(record: Record, band: tuple[float, float]) -> tuple | None:
+def fit_peak(record: StationaryRecord, band: tuple[float, float]) -> tuple | None:
     """Fit natural frequency [Hz] and damping ratio to the largest peak of H1, with half-widths.
 
     Parameters
     ----------
-    record : Record
+    record : StationaryRecord
         Equally spaced samples of drive and output.
     band : tuple
         Lowest and highest frequency of the drive [Hz].

@@ -228,7 +228,7 @@ def _describe_pieces(scene: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class WornFriction:
+class FrictionOverWear:
     """Factors by which friction parameters change with the mean wear depth.
 
     They are linear between their rows and constant beyond the last row.
@@ -276,7 +276,7 @@ class WearModel:
     jumps: int | None
     upper_share: float
     uses_friction_work: bool
-    friction: WornFriction | None = None
+    friction: FrictionOverWear | None = None
     start: EarlierWear | None = None
 
     def compute_earlier_depth(self, axes, area) -> np.ndarray:
@@ -290,7 +290,7 @@ def build_wear_model(scene: Scene) -> WearModel:
     friction = start = None
     if wear.friction is not None:
         table = wear.friction
-        friction = WornFriction(table.depth, table.coefficient_factor, table.bond_length_factor)
+        friction = FrictionOverWear(table.depth, table.coefficient_factor, table.bond_length_factor)
     if wear.start is not None:
         start = read_earlier_wear(scene.resolve_path(wear.start), scene.tables())
     return WearModel(

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from ..kernel_cache.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ..kernel_cache.jit import njit
+from ..motion_measures import STICKING_SLIP_FRACTION
 from .law_kernels import find_share
 from .motion_kernels import Goal, find_rest, is_linear, locate, rotate, sample
 from .rows import Energy, Law, LawNumber, Loop, Number, Seen
@@ -21,7 +22,6 @@ N_PARABOLAS = 5  # further parabolas for an extreme of force or acceleration, ea
 # Distance of a vertex from the middle of three points, relative to their spacing, up to which it is searched
 MAX_VERTEX_OFFSET = 1.5
 SAME_SLIDE = 1e-12  # relative difference of slides that is round-off
-STICK_SHARE = 0.5  # irreversible part of the motion from which a point slips
 
 
 class Vertex(NamedTuple):
@@ -329,8 +329,8 @@ def find_time_above(begin, level, crossing):
 def observe_motion(body, piece, seen):
     """Add a piece of the window to `seen`: its stick, turns of the slip, and extremes of acceleration and force inside.
 
-    A point sticks while the irreversible part of its motion lies between -STICK_SHARE and STICK_SHARE; after a turn it may
-    be negative. Slip starts where it rises above this level, in a piece or by a jump between two pieces.
+    A point sticks while the magnitude of the irreversible part of its motion is at most STICKING_SLIP_FRACTION; after a turn
+    this part may be negative. Slip starts where it rises above this level, in a piece or by a jump between two pieces.
 
     Parameters
     ----------
@@ -348,16 +348,17 @@ def observe_motion(body, piece, seen):
         return
 
     # Stick and starts of slip
+    level = STICKING_SLIP_FRACTION
     turn = case[Number.OMEGA] * dt
     begin = find_share(first, piece.branch, numbers)
     end = find_share(piece.last, piece.branch, numbers)
     shares = begin, end
-    low = find_crossing(body, piece, shares, -STICK_SHARE)
-    high = find_crossing(body, piece, shares, STICK_SHARE)
-    stuck = find_time_above(begin, -STICK_SHARE, low) - find_time_above(begin, STICK_SHARE, high)
+    low = find_crossing(body, piece, shares, -level)
+    high = find_crossing(body, piece, shares, level)
+    stuck = find_time_above(begin, -level, low) - find_time_above(begin, level, high)
     seen[Seen.STUCK] += stuck * turn
-    jumps = seen[Seen.SHARE] <= STICK_SHARE < begin
-    if jumps or begin <= STICK_SHARE < end:
+    jumps = seen[Seen.SHARE] <= level < begin
+    if jumps or begin <= level < end:
         phase = first.phase * rotate(0.0 if jumps else high * turn)
         seen[Seen.STARTS] += 1
         seen[Seen.COS_START] += phase.real**2 - phase.imag**2

@@ -25,7 +25,7 @@ PUBLIC = {
     "findings": ("compute_accuracy_curve",),
     "batch.case_results": ("CaseResults", "FAILED_OUTCOME"),
     "patch.mesh_levels": ("solve_with_coarser",),
-    "pieces": ("PieceFields", "Pieces", "compute_pieces"),
+    "pieces": ("PieceFields", "PieceFrames", "compute_pieces"),
     "results.patch_rows": ("PATCH_TABLE",),
     "results.result": ("describe_measure",),
     "rig.engines": ("choose_numerics",),

@@ -1,6 +1,6 @@
 """Findings of a run: measures that miss the tolerance with the advice that reduces their errors, and balances that fail.
 
-In: the measures of a run with their errors, and its pressed interfaces. Out: `Finding`s, whose sentences are warnings.
+In: the measures of a run with their errors, and its pressed interfaces. Out: `AccuracyFinding`s with their sentences.
 The error of a measure is `safety * change / (ratio**order - 1)` (`convergence`). An error that is `excess` times
 the allowed one therefore needs a resolution that is finer by the factor `excess ** (1 / order)`. Read
 `find_missed_measures` first, then ADVICE_BY_AXIS. `mark_unbalanced` checks the equilibrium of a pressed patch, and the
@@ -9,7 +9,6 @@ runs of its error estimate.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from math import ceil, floor, inf, log2, log10
 from typing import NamedTuple
 
@@ -24,9 +23,9 @@ from . import refine
 from .patch import mesh_levels
 from .refine import is_main
 from .results import notes, patch_rows
-from .results.interfaces import Face, merge_findings
+from .results.interfaces import PressedFace, merge_findings
 from .results.patch_rows import Measures, Values
-from .results.result import Advice, Finding, Result
+from .results.result import AccuracyFinding, Advice, Result
 from .rig import engines
 
 # Ratio of proposed to present tolerance; a tenth gives at least one more halving of the mesh.
@@ -45,7 +44,7 @@ class Missed(NamedTuple):
     ----------
     result : Result
         Result of the run.
-    faces : tuple of Face
+    faces : tuple of PressedFace
         Pressed interfaces of the run, or the one to which the measures belong.
     model : Model
         Model of the run or of the interface.
@@ -56,7 +55,7 @@ class Missed(NamedTuple):
     """
 
     result: Result
-    faces: tuple[Face, ...]
+    faces: tuple[PressedFace, ...]
     model: Model
     measures: Mapping[str, Measure]
     excess: Mapping[str, float]
@@ -83,7 +82,7 @@ class Missed(NamedTuple):
         shortage = self.result.shortage
         return shortage is not None and shortage.axis == axis
 
-    def make_finding(self, advice: Advice) -> Finding:
+    def make_finding(self, advice: Advice) -> AccuracyFinding:
         """Return the finding on these measures: errors, tolerance and advice."""
         first, *others = self.find_names()
         words = f"{first} has an estimated error of {_format_error(self.measures[first])}"
@@ -92,17 +91,17 @@ class Missed(NamedTuple):
         count = len(self.excess) - 1 - len(others)
         if count:
             words += f" ({count} other measure{'s' * (count > 1)} also exceed{'s' * (count < 2)} the tolerance)"
-        return Finding(words, advice)
+        return AccuracyFinding(words, advice)
 
 
-def find_missed_measures(result: Result, faces: tuple[Face, ...]) -> list[Finding]:
+def find_missed_measures(result: Result, faces: tuple[PressedFace, ...]) -> list[AccuracyFinding]:
     """Return a finding on the static measures of each interface that miss the tolerance, and one on those of the motion.
 
     Parameters
     ----------
     result : Result
         Result of the run.
-    faces : tuple of Face
+    faces : tuple of PressedFace
         Pressed interfaces of the run.
     """
     model = result.plan.model
@@ -115,11 +114,11 @@ def find_missed_measures(result: Result, faces: tuple[Face, ...]) -> list[Findin
         if ratio > 1 and not is_warned_of:
             excess[name] = ratio
 
-    def find_on_face(face: Face) -> list[Finding]:
+    def find_on_face(face: PressedFace) -> list[AccuracyFinding]:
         """Return the findings on the static measures of one interface, and remove these measures from `excess`.
 
-        The result numbers the measures of all interfaces after the first one (`Face.name_measure`), but the sentences on one
-        interface do not.
+        The result numbers the measures of all interfaces after the first one (`PressedFace.name_measure`), but the sentences
+        on one interface do not.
         """
         numbered = {name: face.name_measure(name) for name in patch_rows.PATCH_TABLE}
         own = {name: measures[full] for name, full in numbered.items() if full in measures}
@@ -142,7 +141,7 @@ def _format_error(measure) -> str:
     return f"at least its value ({measure})"
 
 
-def _find_static(missed: Missed) -> list[Finding]:
+def _find_static(missed: Missed) -> list[AccuracyFinding]:
     """Return the findings on the static measures of one interface: their advice, and that to split its profile.
 
     The waves of a profile that the mesh does not resolve can be represented by a layer of asperities instead.
@@ -155,11 +154,11 @@ def _find_static(missed: Missed) -> list[Finding]:
         return findings
     if face.patch.points is None or missed.model.moves:
         element = longest_loaded_cell(face.patch.x, face.patch.active)
-        findings += map(Finding, trace_split.advise_split(face.model.patch, element))
+        findings += map(AccuracyFinding, trace_split.advise_split(face.model.patch, element))
     return findings
 
 
-def _advise_on_statics(missed: Missed, face: Face) -> Advice:
+def _advise_on_statics(missed: Missed, face: PressedFace) -> Advice:
     """Return the advice for inaccurate static measures: a finer mesh, if it helps."""
     patch_model = face.model.patch
     peak = missed.measures.get("pressure_peak")
@@ -368,8 +367,7 @@ def mark_unbalanced(result: Result) -> Result:
     warnings = [*_check_load(result), *_check_energy(result)]
     if not warnings:
         return result
-    return replace(
-        result,
+    return result.with_changes(
         outcome=Outcome.NOT_CONVERGED,
         measures=run_measures.outcome.remove_errors(result.measures),
         warnings=[*warnings, *result.warnings],

@@ -1,6 +1,6 @@
 """Displacement and stress inside both pieces in all frames of a run, and where a material yields.
 
-In: a `Result` with a solved patch. Out: `Pieces`, plain arrays on the meshes of both pieces and on
+In: a `Result` with a solved patch. Out: `PieceFrames`, plain arrays on the meshes of both pieces and on
 their interface.
 """
 
@@ -43,7 +43,7 @@ class PieceFields(NamedTuple):
     stress_error: np.ndarray
 
 
-class Pieces(NamedTuple):
+class PieceFrames(NamedTuple):
     """Both pieces and their interface in f frames.
 
     - time (f,): [s].
@@ -88,7 +88,7 @@ class _LoadedPiece(NamedTuple):
         return (u[:1] + u[1:])[self.case]
 
 
-def compute_pieces(result, pair=None) -> Pieces:
+def compute_pieces(result, pair=None) -> PieceFrames:
     """Compute displacement and stress of both pieces in the frames of a run.
 
     Parameters
@@ -100,7 +100,7 @@ def compute_pieces(result, pair=None) -> Pieces:
 
     Returns
     -------
-    Pieces
+    PieceFrames
     """
     patch = result.patch
     fields = result.fields
@@ -130,7 +130,7 @@ def compute_pieces(result, pair=None) -> Pieces:
     slide = _holder_field(fields, "slide", 0.0)
     interface["holder_slide"] = np.repeat(slide, surface.x.size, axis=1)
     width = result.plan.model.patch.pieces.width
-    return Pieces(fields["time"], lower, upper, surface.x, surface.weight, interface, width)
+    return PieceFrames(fields["time"], lower, upper, surface.x, surface.weight, interface, width)
 
 
 def number_distinct_frames(*fields: np.ndarray) -> np.ndarray:
@@ -279,7 +279,7 @@ def _interpolate_displacement(piece: PieceFields, interface, x) -> np.ndarray:
     return np.stack(by_axis, axis=2)
 
 
-def add_yielding_notes(result, pieces: Pieces) -> None:
+def add_yielding_notes(result, pieces: PieceFrames) -> None:
     """Add notes on materials that yield inside the pieces to the notes of a result.
 
     They replace notes on the same material at its face, which know only the pressure.
@@ -294,14 +294,14 @@ def add_yielding_notes(result, pieces: Pieces) -> None:
     notes += [text for text in yielding.values() if text not in notes]
 
 
-def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict[Strength, str]:
+def find_yielding(patch_model, pieces: PieceFrames, min_peak: float = 0.0) -> dict[Strength, str]:
     """Find the materials whose von Mises stress exceeds their yield strength in any frame.
 
     Parameters
     ----------
     patch_model : PatchModel
         Patch with the strengths of its materials.
-    pieces : Pieces
+    pieces : PieceFrames
         Stresses of both pieces in all frames.
     min_peak : float
         Lower limit of the peak pressure [Pa]. A material of a face is left out if this pressure

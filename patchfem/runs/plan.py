@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .. import friction, inputs, structure
-from ..core import Missing, add_interface_number, array_dataclass
+from ..core import Missing, PatchfemError, add_interface_number, array_dataclass
 from ..effects import EFFECTS, law_has_trait
 from ..model.model import Model, build
 from ..model.source import locate_errors, name_key
@@ -63,21 +63,21 @@ class Plan:
     - model: model of the run.
     - engine: name of the engine; "static" for a patch without motion.
     - unknowns: numbers of unknowns of mesh and motion by name.
-    - samples: number of samples that a bench keeps; 0 for other runs.
     - chain: stiffness [N/m], or "rigid", of each element in series between modes and interface.
     - groups: dimensionless groups by name.
     - verdict: sentences on the run.
     - draws_curve: whether a response curve is drawn; without it only its peak is computed, as for a case of a sweep.
+    - n_cases: number of cases of the table [sweep] of the scene; `run` refuses a plan with more than 1, that of the first.
     """
 
     model: Model
     engine: str
     unknowns: dict[str, int]
-    samples: int
     chain: "of_rig.Chain"
     groups: Values
     verdict: tuple[str, ...]
     draws_curve: bool = True
+    n_cases: int = 1
 
     @property
     def kind(self) -> str:
@@ -154,7 +154,7 @@ def plan(source) -> Plan:
 def plan_first_case(source) -> Plan:
     """Plan the run of a Scene or a Model; of a Scene with a table [sweep] plan the first case, and say so.
 
-    Parameters and errors are those of `plan`, but a [sweep] is allowed. The result is to be shown, not to be run.
+    Parameters and errors are those of `plan`, but a [sweep] is allowed. `run` refuses the plan of a first case.
     """
     if isinstance(source, Model) or not source.sweep:
         return plan(source)
@@ -164,7 +164,18 @@ def plan_first_case(source) -> Plan:
     count = prod(len(axis.texts) for axis in source.sweep)
     case = plan(build(BaseScene(source).override(first)))
     sentence = f"this is the first of {count} cases of [sweep], {', '.join(first)}; `--set` of its keys chooses another one"
-    return replace(case, verdict=(sentence, *case.verdict))
+    return replace(case, verdict=(sentence, *case.verdict), n_cases=count)
+
+
+def refuse_first_case(run_plan: Plan) -> None:
+    """Raise PatchfemError if a plan is that of the first of several cases of a table [sweep]."""
+    if run_plan.n_cases == 1:
+        return
+    raise PatchfemError(
+        f"this plan shows the first of {run_plan.n_cases} cases, and its run would leave out the others; use `patchfem "
+        "sweep` or pf.sweep, or choose a case by the keys of [sweep] when you make the plan",
+        "sweep",
+    )
 
 
 def _make_plan(model: Model) -> Plan:
@@ -191,7 +202,6 @@ def _make_plan(model: Model) -> Plan:
     groups: Values = {}
     unknowns: dict[str, int] = {}
     engine = "static"
-    samples = 0
     patch_sentences = []
     if model.patches:
         unknowns = patch_plan.count_unknowns(model)
@@ -199,11 +209,12 @@ def _make_plan(model: Model) -> Plan:
         engine = engines.choose_engine(model).name
         chain = of_rig.structure_stiffnesses(rig) | chain
         groups = of_rig.compute_dimensionless_groups(model) if model.kind == "rig" else {}
-        unknowns |= of_rig.count_unknowns(model)
+        unknowns["modes"] = len(rig.structure.frequencies)
         sentences += engines.describe_unused_settings(model, engine)
     elif model.moves:
-        engine, counts, samples = of_bench.count_bench_sizes(model)
-        unknowns |= counts
+        sizes = of_bench.count_bench_sizes(model)
+        engine = sizes.engine
+        unknowns |= sizes.unknowns
         groups = of_bench.compute_dimensionless_groups(model)
 
     if model.patch is not None:
@@ -228,7 +239,7 @@ def _make_plan(model: Model) -> Plan:
     sentences += [*patch_sentences, *_describe_grooves(model)]
     if "slip_length" in groups:
         sentences.append(patch_plan.describe_shear(model.patch, groups["slip_length"]))
-    return Plan(model, engine, unknowns, samples, chain, groups, tuple(sentences))
+    return Plan(model, engine, unknowns, chain, groups, tuple(sentences))
 
 
 def _describe_interface_patches(friction_model) -> "tuple[of_rig.Chain, list[str]]":
@@ -288,6 +299,7 @@ def _describe_grooves(model: Model) -> list[str]:
 
 # ---- memory of a run
 
+NEGLIGIBLE_BYTES = 50e6  # memory of a run beside that of the program which always fits
 BYTES_PER_STATIC_NODE = 4.6e3  # per node of the pieces of a static patch, to condense them
 BYTES_PER_MOVING_NODE = 8.1e3  # the same, with the frames of a motion
 BYTES_PER_SLIDE_SAMPLE = 250.0  # per sample of a prescribed slide
@@ -356,8 +368,9 @@ def list_memory_parts(plan: Plan) -> list[MemoryPart]:
         remedy = f"lower {steps_key or 'slide.cycles'}"
         if model.slide.kind == "file":
             remedy = "give fewer rows in slide.file"
-        size = BYTES_PER_SLIDE_SAMPLE * plan.samples
-        parts.append(MemoryPart(size, f"{plan.samples} samples of the slide", remedy))
+        n_samples = of_bench.count_bench_sizes(model).samples
+        size = BYTES_PER_SLIDE_SAMPLE * n_samples
+        parts.append(MemoryPart(size, f"{n_samples} samples of the slide", remedy))
     elif model.rig is not None:
         parts += _list_memory_parts_of_motion(plan, steps_key)
     return sorted(parts, reverse=True)
@@ -460,12 +473,15 @@ def refuse_insufficient_memory(plan: Plan, say: Callable[[str], None] | None = N
     Missing
         With the largest contribution and its remedy.
     """
-    # A run that fits into what is free and allowed goes on without a word.
+    # A run that fits into what is free and allowed goes on without a word; one that hardly needs more than the program that
+    # asks for it fits, and the free memory is not looked up.
     parts = list_memory_parts(plan)
     total = sum(part.bytes for part in parts)
-    free = free_bytes()
     given = plan.model.accuracy.max_memory
     allowed = given or refine.DEFAULT_MAX_BYTES
+    if total <= min(refine.PROGRAM_BYTES + NEGLIGIBLE_BYTES, allowed):
+        return
+    free = free_bytes()
     if total <= min(free, allowed):
         return
 

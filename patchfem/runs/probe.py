@@ -1,8 +1,9 @@
 """Probe of a plan: one run without error estimates, with its measured time.
 
-In: a Plan. Out: a `Probe`, whose sentences say how the time grows with each setting.
+In: a Plan. Out: a `MeasuredPlan`, whose sentences say how the time grows with each setting.
 """
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..core import remove_interface_number
@@ -17,7 +18,7 @@ DOUBLED_CELLS_TIME_RATIO = 5
 HALF_ELEMENT_SIZE_TIME_RATIO = 5
 
 
-class Probe(NamedTuple):
+class MeasuredPlan(NamedTuple):
     """Measured time of a run without error estimates.
 
     - seconds: CPU seconds by stage, and "total".
@@ -34,15 +35,17 @@ class Probe(NamedTuple):
         return self.static | {"seconds": self.seconds, "sentences": list(self.sentences)}
 
 
-def run_probe(plan: Plan) -> Probe:
+def run_probe(plan: Plan) -> MeasuredPlan:
     """Run a plan once without error estimates and measure the time of its stages.
+
+    Of a scene with [sweep] it is the plan and the time of the first case.
 
     Raises
     ------
     PatchfemError
         If the scene cannot be run.
     """
-    result = run(plan, estimate=False)
+    result = run(replace(plan, n_cases=1), estimate=False)
     seconds = {name: round(float(value), 3) for name, value in result.seconds.items()}
     motion = seconds.get("march", seconds.get("bench", 0.0))
     stages = [f"{motion:.2g} s of it for the motion"] * bool(motion)
@@ -52,7 +55,7 @@ def run_probe(plan: Plan) -> Probe:
     # The points of a response curve are no stage of their own; the stages are those of its peak.
     total = seconds["total"]
     curve = 2 * total - sum(seconds.values())
-    if curve > total / 2:
+    if plan.engine == "harmonic" and curve > total / 2:
         motion = 0.0
         stages = [f"{curve:.2g} s of it for the response curve"]
     sentences = [", ".join([f"a run without error estimates took {total:.2g} CPU s", *stages])]
@@ -63,7 +66,7 @@ def run_probe(plan: Plan) -> Probe:
         row = PATCH_TABLE.get(remove_interface_number(name))
         if row is not None and row.group == "patch":
             static[name] = measure.value
-    return Probe(seconds, static, tuple(sentences))
+    return MeasuredPlan(seconds, static, tuple(sentences))
 
 
 def _describe_factors(plan: Plan, *, has_motion: bool, has_contact: bool) -> list[str]:

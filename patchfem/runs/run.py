@@ -22,10 +22,10 @@ from . import joint, refine
 from .findings import find_missed_measures, mark_unbalanced
 from .patch import area_motion, faces, mesh_levels, store, strength
 from .patch import result as patch_result
-from .plan import Plan, plan, refuse_insufficient_memory
-from .results.interfaces import Face, merge_sentences
+from .plan import Plan, plan, refuse_first_case, refuse_insufficient_memory
+from .results.interfaces import PressedFace, merge_sentences
 from .results.patch_rows import Measures, find_unknown_measures
-from .results.result import Result, RunInputs, describe_measure, shorten_file_names
+from .results.result import Result, RunInputs, Statements, describe_measure, shorten_file_names
 from .rig import engines, rig
 from .wear import evolve, measures
 
@@ -58,7 +58,7 @@ class FinishedPass(NamedTuple):
 
     model: Model
     result: Result
-    pressed: tuple[Face, ...]
+    pressed: tuple[PressedFace, ...]
     seconds: float
 
 
@@ -97,9 +97,12 @@ def run(
         With the static patch as partial result if the motion was not found.
     Missing
         If the scene cannot be run.
+    PatchfemError
+        If the Plan is that of the first case of a table [sweep].
     """
     runnable = runnable if isinstance(runnable, Plan) else plan(runnable)
     with locate_errors(runnable.model.source):
+        refuse_first_case(runnable)
         refuse_insufficient_memory(runnable, say)
         if fresh:
             store.clear_cache()
@@ -111,7 +114,7 @@ def run(
         passes = _Passes(runnable, refine.RunControl(limit, say, progress, estimate), state_file)
         done, shortage = refine.refine(passes.solve, runnable.model, passes.judge, limit, say)
         if shortage is not None:
-            done = done._replace(result=replace(done.result, shortage=shortage))
+            done = done._replace(result=done.result.with_changes(shortage=shortage))
         done.result.seconds["total"] = process_time() - start
         return _complete_result(done)
 
@@ -134,7 +137,7 @@ class _Passes:
         self.control = control
         self.state_file = state_file
         self._count = 0
-        self._pressed: tuple[Face, ...] = ()
+        self._pressed: tuple[PressedFace, ...] = ()
 
     def solve(self, model: Model, earlier: FinishedPass | None) -> FinishedPass | None:
         """Run a model after an earlier pass, None for the first one; return None if it cannot improve the earlier pass."""
@@ -171,7 +174,7 @@ class _Passes:
             return refine.Verdict(0.0)
         return refine.judge_pass(self.plan.model, done, excesses)
 
-    def _run_model(self, model: Model, seconds) -> tuple[Result, tuple[Face, ...]]:
+    def _run_model(self, model: Model, seconds) -> tuple[Result, tuple[PressedFace, ...]]:
         """Press the interfaces of a model, wear them, and compute its motion; return the result and the interfaces.
 
         A patch without contact and a rig without load have a result at once. `seconds` gets the CPU times by step. The
@@ -224,7 +227,7 @@ class _Passes:
             result, pressed = self._move(inputs)
         return mark_unbalanced(result), pressed
 
-    def _move(self, inputs: RunInputs) -> tuple[Result, tuple[Face, ...]]:
+    def _move(self, inputs: RunInputs) -> tuple[Result, tuple[PressedFace, ...]]:
         """Compute the wear of the patch, if the scene has [wear], and then the motion on the worn patch.
 
         Returns the result, and the pressed interfaces with their worn surfaces.
@@ -299,8 +302,8 @@ class _Passes:
 
 
 def _press_interfaces(
-    model: Model, before: tuple[Face, ...], *, estimate: bool
-) -> tuple[Face, ...]:
+    model: Model, before: tuple[PressedFace, ...], *, estimate: bool
+) -> tuple[PressedFace, ...]:
     """Press all interfaces of a model that have a patch, on the meshes of the run and of its error estimate.
 
     `before` are the interfaces of the pass before, () in the first one.
@@ -310,14 +313,14 @@ def _press_interfaces(
     if model.has_bolted_patch:
         # The patches of the pass before, whose stiffness was then matched to that of the joint, are stored as they were.
         solved = joint.solve_patch(before[0].model) if before else ()
-        return (Face(0, "", model, joint.solve_patch(model, solved)),)
+        return (PressedFace(0, "", model, joint.solve_patch(model, solved)),)
     tolerance = model.accuracy.tolerance
     solved = (before[0].unworn or before[0].patches) if before else ()
     patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate, tuple(solved))
-    return (Face(0, "", model, patches),)
+    return (PressedFace(0, "", model, patches),)
 
 
-def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
+def _add_static_measures(result: Result, pressed: tuple[PressedFace, ...]) -> Result:
     """Return a Result that begins with the static measures of all pressed interfaces, such as their peak pressures."""
     static: Measures = {}
     for face in pressed:
@@ -327,7 +330,7 @@ def _add_static_measures(result: Result, pressed: tuple[Face, ...]) -> Result:
     return replace(result, measures=static | motion)
 
 
-def _warn_of_pressed_patch(face: Face, *, estimate: bool) -> list[str]:
+def _warn_of_pressed_patch(face: PressedFace, *, estimate: bool) -> list[str]:
     """Return warnings on large strains, and on a mesh too coarse for an error estimate."""
     has_error_mesh = not estimate or face.patches[1] is not None
     return patch_result.patch_warnings(face.model.patch, face.patch, has_error_mesh=has_error_mesh)
@@ -340,8 +343,10 @@ def _make_result_without_load(inputs: RunInputs) -> Result:
         outcome=Outcome.NO_CONTACT,
         measures={"normal_load": Measure(0.0, "N", 0.0)},
         seconds=inputs.seconds,
-        warnings=[*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_NO_MOTION_MESSAGE],
-        notes=inputs.notes,
+        statements=Statements(
+            [*inputs.warnings, Outcome.NO_CONTACT.sentence, NO_FRICTION_NO_MOTION_MESSAGE],
+            inputs.notes,
+        ),
     )
 
 
@@ -413,8 +418,7 @@ def _complete_result(done: FinishedPass) -> Result:
     for name, measure in result.measures.items():
         described[name] = replace(measure, text=describe_measure(name, part))
 
-    return replace(
-        result,
+    return result.with_changes(
         outcome=outcome,
         patch=patch,
         measures=described,

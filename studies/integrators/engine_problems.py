@@ -114,7 +114,7 @@ def problem(name: str) -> Problem:
     modes = model.rig.modes
     drive = model.rig.drive.signal
     patch = solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
-    k, y = list_joints(model, patch, choose_numerics(model).meshed)[0].list_elements()
+    k, y = list_joints(model, patch, choose_numerics(model).space.meshed)[0].list_elements()
     numbers = {
         "omega": modes.omega,
         "zeta": modes.zeta,

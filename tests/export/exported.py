@@ -6,7 +6,7 @@ import numpy as np
 
 from patchfem.export.fields import vtkhdf
 from patchfem.export.fields.vtkhdf import make_blocks
-from patchfem.runs import PieceFields, Pieces
+from patchfem.runs import PieceFields, PieceFrames
 
 X = np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3])  # columns of nodes [m]
 
@@ -51,7 +51,7 @@ def write_small_series(folder, frames: int = 3, times=None, order=None):
         "normal_bond_lower": rng.normal(size=(frames, 4)) * 1e6,
         "worn_depth": rng.random((frames, 4)) * 1e-7,
     }
-    pieces = Pieces(times, lower, upper, X, np.ones(4), interface, width=5e-3)
+    pieces = PieceFrames(times, lower, upper, X, np.ones(4), interface, width=5e-3)
     blocks = make_blocks(pieces)
     folder.mkdir(exist_ok=True)
     vtkhdf.write_blocks(folder / vtkhdf.VTKHDF_FILE, blocks, times)

@@ -5,7 +5,7 @@ import pytest
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import G_N
-from patchfem.measures import Level, bracket_onset, make_onset_test
+from patchfem.measures import DriveLevel, bracket_onset, make_onset_test
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -31,7 +31,7 @@ ONSET = 0.3 * 26 * 4.4482216152605 / 0.884
 
 def make_level(drive, amplitude, stuck=False, error=0.0):
     """Return a drive level with an amplitude and its error."""
-    return Level(drive, stuck, {NAME: amplitude}, {NAME: error})
+    return DriveLevel(drive, stuck, {NAME: amplitude}, {NAME: error})
 
 
 def test_exact_onset_of_table():

@@ -135,7 +135,7 @@ def test_always_error_of_drift_holds_where_it_changes_little_by_accident():
     group = lumped.collect_cases(models)
     exact = march_cases(group.cases, 4 * lumped.BATCH_STEPS_PER_CYCLE[-1]).values["drift_per_cycle"]
     holds = []
-    for cases, refined in lumped.refine(group):
+    for cases, refined in lumped.march_group(group):
         difference = refined.march.values["drift_per_cycle"] - exact[cases]
         holds += (np.abs(difference) <= refined.errors["drift_per_cycle"])[
             np.isfinite(difference)

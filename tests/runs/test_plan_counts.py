@@ -8,7 +8,9 @@ from command_line import run_cli
 from scene_runs import load_scene, run_scene
 from scene_texts import COATED, COULOMB, KILOGRAM, POINT, SLIDE
 
+import patchfem as pf
 from patchfem import load, plan
+from patchfem.core import PatchfemError
 from patchfem.runs.probe import run_probe
 from patchfem.runs.run import run
 
@@ -67,6 +69,23 @@ def test_exact_plan_of_a_sweep_is_that_of_its_first_case():
     assert (
         "first of 4 cases of [sweep], drive.force=25 N, friction.static=0.5;" in run_plan.verdict[0]
     )
+
+
+def test_refuses_to_run_the_plan_of_a_sweep():
+    """A run of the plan of a scene with [sweep] would leave out all cases but the first; with the swept keys set it runs.
+
+    The probe measures the first case, as its plan says.
+    """
+    cases = FORCED + '[sweep]\n"drive.force" = ["25 N", "50 N"]\n'
+    run_plan = pf.plan(cases)
+    for run_it in (run, pf.run):
+        with pytest.raises(PatchfemError, match=r"sweep.*first of 2 cases.*use `patchfem sweep`"):
+            run_it(run_plan)
+    chosen = pf.run(pf.plan(cases, **{"drive.force": "50 N"}))
+    single = run_scene(FORCED, "drive.force=50 N")
+    name = "friction_force_peak"
+    assert chosen.measures[name].value == single.measures[name].value
+    assert run_probe(run_plan).seconds["total"] > 0
 
 
 def test_exact_probe_of_a_curve_names_the_curve():

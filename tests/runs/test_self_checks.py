@@ -93,7 +93,7 @@ def test_always_wrong_load_ends_run_as_not_converged():
     result = run_scene(COATED, "")
     pressure = result.patch.pressure
     pressure = replace(pressure, sigma_n=1.01 * pressure.sigma_n)
-    marked = mark_unbalanced(replace(result, patch=replace(result.patch, pressure=pressure)))
+    marked = mark_unbalanced(result.with_changes(patch=replace(result.patch, pressure=pressure)))
     assert marked.outcome is Outcome.NOT_CONVERGED
     warning = "is 116.81 N, but the load is 115.654 N; they differ by 0.01 of the load"
     assert warning in marked.warnings[0]

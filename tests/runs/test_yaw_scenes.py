@@ -52,7 +52,7 @@ def test_exact_bands_of_a_face_wear_by_their_own_slip():
     text = BLOCK + AREA + make_friction_table("coulomb") + mode
     result = run(load(text + DRIVE.replace("cycles = 30", "cycles = 60") + wear))
     slides = result.window.extra["slides"]
-    period = result.motion.period
+    period = result.histories.period
     is_last = result.window.time >= result.window.time[-1] - (1 + 1e-9) * period
     amplitudes = np.ptp(slides[is_last], axis=0) / 2
     volumes = np.bincount(

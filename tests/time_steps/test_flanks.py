@@ -15,6 +15,7 @@ from patchfem.core import SineDrive
 from patchfem.friction import Bonds, Grooves
 from patchfem.motion_measures import energy_balance
 from patchfem.partial_slip.shear_modes import shear_modes
+from patchfem.runs.bench.engine import SpaceSettings
 from patchfem.runs.interfaces import contact_points
 from patchfem.scene.keys.tables import Friction
 from patchfem.time_steps import laws
@@ -110,7 +111,7 @@ def make_coulomb_contact(grooves, tolerance, compliance=COMPLIANCE):
         point=None,
         accuracy=SimpleNamespace(tolerance=tolerance, shear_modes=None),
     )
-    numerics = SimpleNamespace(meshed=(), shear_modes=None)
+    numerics = SimpleNamespace(space=SpaceSettings())
     return contact_points.make_contact(model, numerics, patch)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...formatting import format_length, format_quantity
+from ...runs.refine import NO_LIMIT, Verdict, refine
 from .balance import compute_balance_curve
 from .joint import MIN_AMPLITUDE_OVER_GROSS_SLIP, JointMode
 from .quasi_static import compute_static_curve
@@ -17,6 +18,8 @@ MAX_CURVE_CHANGE = 0.08
 # Ratio of neighbouring amplitudes below which no point is added. A rigid contact begins to slip at once, so that its damping
 # jumps; this is the width within which the place of the jump is found.
 MIN_AMPLITUDE_SPACING_RATIO = 1.001
+MAX_HALVINGS = 9  # Largest number of halvings of the spacing, from the default one to the smallest.
+MAX_ADDED_DECADES = 8  # Number of decades by which the default range is extended to reach a force.
 
 
 def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
@@ -117,29 +120,36 @@ def refine_amplitudes(joint: JointMode, amplitudes) -> np.ndarray:
 
     # The force of phase resonance is not needed here.
     joint = joint._replace(has_force=False)
-    known = estimate_curve(joint, amplitudes)
 
-    # A step that is too wide is divided at the geometric mean of its ends.
-    # Each may halve the spacing, from the default one to the smallest
-    for _ in range(9):
-        if known is None or known.amplitude.size < 2:
-            break
-        is_wide = np.zeros(known.amplitude.size - 1, bool)
-        for values in (known.frequency, known.damping):
-            step = np.abs(np.diff(values))
-            is_wide |= step > MAX_CURVE_CHANGE * (np.nanmax(values) - np.nanmin(values))
-        # The halves of a step have the square root of its ratio, which must not fall below MIN_AMPLITUDE_SPACING_RATIO.
-        is_wide &= known.amplitude[1:] > MIN_AMPLITUDE_SPACING_RATIO**2 * known.amplitude[:-1]
-        if not is_wide.any():
-            break
+    def solve(added, before: Curve | None) -> Curve | None:
+        """Return the curve with points at further amplitudes (k,) [m]; None if no such point is known."""
+        curve = estimate_curve(joint, added)
+        if curve is None or before is None:
+            return curve
+        found.append(added)
+        return _join(before, curve)
 
-        between = np.sqrt(known.amplitude[1:] * known.amplitude[:-1])[is_wide]
-        added = estimate_curve(joint, between)
-        if added is None:
-            break
-        known = _join(known, added)
-        amplitudes = np.union1d(amplitudes, between)
-    return amplitudes
+    def judge(known: Curve, excesses: list[float]) -> Verdict:
+        """Ask for a point in each step that is too wide."""
+        between = _find_amplitudes_between(known)
+        if not between.size or len(excesses) == MAX_HALVINGS:
+            return Verdict(0.0)
+        return Verdict(float(between.size), between)
+
+    found = [np.asarray(amplitudes)]
+    refine(solve, amplitudes, judge, NO_LIMIT)
+    return np.unique(np.concatenate(found))
+
+
+def _find_amplitudes_between(curve: Curve) -> np.ndarray:
+    """Return the geometric means of the ends of the steps of a curve that change by more than MAX_CURVE_CHANGE [m]."""
+    is_wide = np.zeros(max(curve.amplitude.size - 1, 0), bool)
+    for values in (curve.frequency, curve.damping):
+        step = np.abs(np.diff(values))
+        is_wide |= step > MAX_CURVE_CHANGE * (np.nanmax(values) - np.nanmin(values))
+    # The halves of a step have the square root of its ratio, which must not fall below MIN_AMPLITUDE_SPACING_RATIO.
+    is_wide &= curve.amplitude[1:] > MIN_AMPLITUDE_SPACING_RATIO**2 * curve.amplitude[:-1]
+    return np.sqrt(curve.amplitude[1:] * curve.amplitude[:-1])[is_wide]
 
 
 def _join(curve: Curve, other: Curve) -> Curve:
@@ -169,19 +179,23 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
     travel = joint.model.rig.springs.travel
     low, high = _default_range(joint)
     count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
-    known = _estimate_forces(joint, np.geomspace(low, high, count))
 
-    # a wider range, decade by decade, until all forces lie inside
-    # Number of decades by which the default range is extended to reach a force
-    for _ in range(8):
+    def solve(added, before: Curve | None) -> Curve:
+        """Return the curve with points at further amplitudes (k,) [m]."""
+        curve = _estimate_forces(joint, np.asarray(added))
+        return curve if before is None else _join(before, curve)
+
+    def judge_range(known: Curve, excesses: list[float]) -> Verdict:
+        """Ask for a range that is wider by a decade, until all forces lie inside."""
         added = []
         if known.force.min() > forces.min() and not joint.is_rigid:
             added.append(known.amplitude[0] / 10)
         if known.force.max() < forces.max() and known.amplitude[-1] < travel:
             added.append(min(10 * known.amplitude[-1], travel))
-        if not added:
-            break
-        known = _join(known, _estimate_forces(joint, np.array(added)))
+        is_last = not added or len(excesses) == MAX_ADDED_DECADES
+        return Verdict(float(len(added)), None if is_last else added)
+
+    known, _ = refine(solve, np.geomspace(low, high, count), judge_range, NO_LIMIT)
     for force in forces:
         if not known.force.min() <= force <= known.force.max():
             ends = [format_quantity(end, "N", 3) for end in (known.force.min(), known.force.max())]
@@ -191,19 +205,18 @@ def find_amplitudes_of_forces(joint: JointMode, forces) -> np.ndarray:
                 f"output for its phase resonance: the forces there are {ends[0]} to {ends[1]}; give other --forces"
             )
 
-    # interpolation in logarithms; each step adds the points that it found
+    # Regula falsi in logarithms; each step adds the points that it found. At most eight steps are needed.
     tolerance = 1e-2 * joint.model.accuracy.tolerance
-    # Largest number of interpolations towards the amplitude of a force
     for _ in range(8):
         # The largest force up to an amplitude leaves the first place at which a force is reached.
         largest = np.log(np.maximum.accumulate(known.force))
-        amplitudes_of_forces = np.exp(np.interp(np.log(forces), largest, np.log(known.amplitude)))
-        new = _estimate_forces(joint, np.unique(amplitudes_of_forces))
-        reached = np.interp(amplitudes_of_forces, new.amplitude, new.force)
+        places = np.exp(np.interp(np.log(forces), largest, np.log(known.amplitude)))
+        new = _estimate_forces(joint, np.unique(places))
+        reached = np.interp(places, new.amplitude, new.force)
         if np.all(np.abs(reached - forces) <= tolerance * forces):
             break
         known = _join(known, new)
-    return amplitudes_of_forces
+    return places
 
 
 def _estimate_forces(joint: JointMode, amplitudes) -> Curve:

@@ -1,12 +1,14 @@
 """Steady friction loops of the contact of a rig under a sinusoidal displacement."""
 
 from dataclasses import replace
+from math import inf
 from typing import NamedTuple
 
 from ...model.model import Model
 from ...model.slide import SlidePath
 from ...runs.bench import bench
 from ...runs.bench.engine import steps_per_cycle
+from ...runs.refine import NO_LIMIT, Verdict, refine
 from ...runs.rig import decays
 
 # Largest number of cycles: most laws are steady after a few, growing bonds after tens.
@@ -55,10 +57,9 @@ def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> 
     tolerance = model.accuracy.tolerance
     # The contact alone: a bench, on which the displacement is prescribed.
     bench_model = replace(decays.with_automatic_method(model), kind="bench", rig=None)
-    # Number of cycles of the first loop, of which the last one is evaluated.
-    cycles = 3.0
-    before = None
-    while True:
+
+    def solve(cycles: float, before: SteadyLoop | None) -> SteadyLoop:
+        """Run a number of cycles, and return the last one with its change from the run before."""
         path = SlidePath(
             kind="sine",
             amplitude=slide,
@@ -71,14 +72,19 @@ def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> 
         contact = replace(bench_model, slide=path)
         steps = steps_per_cycle(contact)
         run = bench.run_bench(contact, patch, steps)
-
-        # Measures of the last cycle, against those with half as many cycles.
+        change = [inf] * len(LOOP_MEASURES)
         if before is not None:
-            change = [abs(run.values[name] - before[name]) for name in LOOP_MEASURES]
-            limits = [tolerance * abs(run.values[name]) for name in LOOP_MEASURES]
-            is_steady = all(step <= limit for step, limit in zip(change, limits))
-            if cycles >= MAX_LOOP_CYCLES or is_steady:
-                return SteadyLoop(run, contact, steps, change)
+            change = [abs(run.values[name] - before.run.values[name]) for name in LOOP_MEASURES]
+        return SteadyLoop(run, contact, steps, change)
 
-        before = run.values
-        cycles *= 2
+    def judge(loop: SteadyLoop, excesses: list[float]) -> Verdict:
+        """Double the cycles until the last one is that of the run with half as many."""
+        limits = [tolerance * abs(loop.run.values[name]) for name in LOOP_MEASURES]
+        is_steady = all(step <= limit for step, limit in zip(loop.change, limits))
+        cycles = loop.model.slide.cycles
+        if is_steady or (excesses and cycles >= MAX_LOOP_CYCLES):
+            return Verdict(0.0)
+        return Verdict(inf, 2 * cycles)
+
+    # The first run has three cycles, of which the last one is evaluated.
+    return refine(solve, 3.0, judge, NO_LIMIT)[0]

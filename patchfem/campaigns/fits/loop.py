@@ -6,6 +6,7 @@ linearly between rows. If the force depends on the time steps, they are halved u
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from ...runs.bench.bench import run_bench
 from ...runs.interfaces.bond_lists import choose_slide_summation
 from ...runs.patch.condensed import CondensedPair
 from ...runs.patch.mesh_levels import condense_for_contacts, solve_on_other_mesh
+from ...runs.refine import NO_LIMIT, Verdict, refine
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError
 from ..free_keys import FreeKeys, solve_contact
@@ -34,6 +36,14 @@ MAX_STEP_CHANGE_OVER_TOLERANCE = 0.1
 REST_SPEED_FRACTION = 1e-3
 # Ratio of the largest displacement of a record to that of the scene beyond which one of their units is doubtful
 MAX_STROKE_RATIO = 100
+
+
+class StepChange(NamedTuple):
+    """Readings (k,) with a number of time steps between two rows, and with twice as many."""
+
+    n_steps: int
+    coarse: np.ndarray
+    fine: np.ndarray
 
 
 class LoopComparison(Comparison):
@@ -162,17 +172,30 @@ class LoopComparison(Comparison):
         The effect is negligible if halving the steps changes no reading by more than MAX_STEP_CHANGE_OVER_TOLERANCE times
         the tolerance of the scene, relative to the largest reading. There are at most MAX_STEPS_PER_ROW steps per row.
         """
+        if self.has_fixed_steps or self.steps_per_row >= MAX_STEPS_PER_ROW:
+            return False
         first_steps = self.steps_per_row
         limit = MAX_STEP_CHANGE_OVER_TOLERANCE * self.keys.scene.accuracy.tolerance
-        while not self.has_fixed_steps and self.steps_per_row < MAX_STEPS_PER_ROW:
-            largest = np.abs(self.compute(values)).max()
-            if np.abs(self.measure_step_change(values)).max() <= limit * largest:
-                break
-            self.steps_per_row *= 2
-            if self.listener.say:
-                self.listener.say(
-                    f"{self.steps_per_row} time steps between neighbouring rows of the record"
-                )
+
+        def solve(n_steps: int, before: StepChange | None) -> StepChange:
+            """Compute the change of the reading when a number of steps is doubled."""
+            self.steps_per_row = n_steps
+            coarse = self.compute(values) if before is None else before.fine
+            self.steps_per_row = 2 * n_steps
+            fine = self.compute(values)
+            self.steps_per_row = n_steps
+            return StepChange(n_steps, coarse, fine)
+
+        def judge(change: StepChange, excesses: list[float]) -> Verdict:
+            """Halve the time steps while their effect is not negligible."""
+            n_steps = 2 * change.n_steps
+            allowed = limit * np.abs(change.coarse).max()
+            if np.abs(change.fine - change.coarse).max() <= allowed or n_steps > MAX_STEPS_PER_ROW:
+                return Verdict(0.0)
+            reason = f"{n_steps} time steps between neighbouring rows of the record"
+            return Verdict(np.inf, n_steps, reason=reason)
+
+        refine(solve, first_steps, judge, NO_LIMIT, self.listener.say)
         return self.steps_per_row > first_steps
 
     def estimate_mesh_error(self, values: Sequence[float]) -> np.ndarray:

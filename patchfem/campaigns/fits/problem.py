@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from ...identify.intervals import IntervalKind
 from ...identify.least_squares import Fit, Problem
 from ...model.rig import JOINT_TABLES
 from ...model.structure import name_joint_source
+from ...runs.refine import NO_LIMIT, Verdict, refine
 from ..free_keys import FreeKeys
 from ..held_out import group_by_column, select_held_out
 from .options import FitOptions
@@ -36,6 +38,8 @@ class Listener:
     progress: Callable | None = None
 
 
+# Largest number of fits of a model that is refined after each of them; two to five suffice.
+MAX_FITS = 20
 # Options of a fit for which the user gives none
 DEFAULT_OPTIONS = FitOptions()
 # Listener that reports nothing
@@ -246,6 +250,19 @@ def fit_keys(
     )
 
 
+class _Search(NamedTuple):
+    """Fit of a model.
+
+    - number: number of fits until this one.
+    - problem: problem that the fit solves.
+    - fit: minimum without intervals.
+    """
+
+    number: int
+    problem: Problem
+    fit: Fit
+
+
 def _search_minimum(
     comparison: Comparison, training: np.ndarray, n_starts: int, report: Callable[[], None]
 ) -> Fit:
@@ -267,20 +284,32 @@ def _search_minimum(
     Fit
         With intervals that contain the errors of the data.
     """
-    fit = None
-    # Largest number of refinements of a model in a fit; two to five suffice.
-    for _ in range(20):
-        problem = _make_problem(comparison, training, fit)
-        try:
-            fit = problem.search(n_starts if fit is None else 1, report)
-        except NotConverged as reason:
-            comparison.replace_failed_model(reason)
-            continue
-        if not comparison.refine(fit.values, training):
-            break
-    else:
-        fit = replace(fit, outcome=Outcome.NOT_CONVERGED)
-    return problem.add_intervals(fit, comparison.interval_kind)
+
+    def search(number: int, before: _Search | None) -> _Search | None:
+        """Return the fit of the model as refined around the fit before, None if the comparison does not refine it."""
+        earlier = None
+        if before is not None:
+            earlier = before.fit
+            if not comparison.refine(earlier.values, training):
+                return None
+            if number > MAX_FITS:
+                return _Search(
+                    number, before.problem, replace(earlier, outcome=Outcome.NOT_CONVERGED)
+                )
+        while True:
+            problem = _make_problem(comparison, training, earlier)
+            try:
+                fit = problem.search(n_starts if earlier is None else 1, report)
+                return _Search(number, problem, fit)
+            except NotConverged as reason:
+                comparison.replace_failed_model(reason)
+
+    def judge(last: _Search, excesses: list[float]) -> Verdict:
+        """Fit again until the model is not refined any more."""
+        return Verdict(1.0, None if last.number > MAX_FITS else last.number + 1)
+
+    last, _ = refine(search, 1, judge, NO_LIMIT)
+    return last.problem.add_intervals(last.fit, comparison.interval_kind)
 
 
 def _make_problem(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...core import Outcome, compute_allowed_error
-from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
+from ...runs.batch.case_results import FAILED_OUTCOME, STORED_TEXTS, CaseResults
 from .cases import Cases
 
 # Largest error, relative to the value, of a value that counts for statements.
@@ -111,6 +111,8 @@ class SweepTable:
     messages : dict
         Error message of each failed case, and sentences on the end of each other case that has not settled, by its
         number.
+    texts : dict
+        Texts of STORED_TEXTS by name and number of the case.
     faults : dict
         Sentences on internal faults after which cases were run one by one, as keys.
     """
@@ -122,6 +124,7 @@ class SweepTable:
     is_random: bool = False
     measures: dict[str, MeasureColumn] = field(default_factory=dict)
     messages: dict[int, str] = field(default_factory=dict)
+    texts: dict[str, dict[int, str]] = field(default_factory=dict)
     faults: dict[str, None] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -178,8 +181,12 @@ class SweepTable:
             column.errors[numbers] = part.errors[name]
             column.floors[numbers] = np.nan_to_num(part.floors[name])
         self.faults.update(dict.fromkeys(part.faults))
-        for texts in (part.messages, part.findings):
-            self.messages.update({int(numbers[k]): text for k, text in texts.items()})
+        for name in STORED_TEXTS:
+            texts = {int(numbers[k]): text for k, text in getattr(part, name).items()}
+            self.texts.setdefault(name, {}).update(texts)
+        for name in ("messages", "findings"):
+            texts = self.texts[name]
+            self.messages.update({k: texts[k] for k in numbers.tolist() if k in texts})
 
         # A case that has not settled says so first.
         unsettled = [one for one in Outcome if one not in FINAL_OUTCOMES]

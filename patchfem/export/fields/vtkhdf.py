@@ -14,7 +14,7 @@ from ...core import Missing, PatchfemError
 from ...disk.atomic_write import open_lossy, write_atomically
 from ...runs.pieces import (
     PieceFields,
-    Pieces,
+    PieceFrames,
     add_yielding_notes,
     compute_pieces,
     number_distinct_frames,
@@ -60,14 +60,14 @@ class Block(NamedTuple):
         return self.cells[is_corner], starts, VTK_CELL_TYPES[sizes]
 
 
-def make_blocks(pieces: Pieces) -> dict[str, Block]:
+def make_blocks(pieces: PieceFrames) -> dict[str, Block]:
     """Return the meshes of both pieces and of their interface, with their fields, as blocks for a VTKHDF file.
 
     The interface is a line of segments whose displacement is that of the face of the lower piece.
 
     Parameters
     ----------
-    pieces : Pieces
+    pieces : PieceFrames
         Displacement, stress and interface fields in f frames, in SI units.
 
     Returns

@@ -21,7 +21,7 @@ from ...disk.atomic_write import WriteError, explain_mkdir_error, write_text
 from ...disk.lock import FolderLock
 from ...effects import EFFECTS
 from ...model.model import Model
-from ...runs.batch.case_results import CaseResults, join_case_results
+from ...runs.batch.case_results import STORED_TEXTS, CaseResults, join_case_results
 from .. import store as answers
 from ..answer import Answer, JsonObject, Quantities, Quantity, Remarks, Variable, encode_texts
 from ..folder import WRITER_LOCK_FILE, refuse_others, remove_partial_files, remove_path
@@ -58,10 +58,10 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
         data[part] = Variable(("measure", "case"), np.array(columns, kind), "")
     attributes = {
         "measures": json.dumps(results.units),
-        "messages": json.dumps(dict(results.messages), ensure_ascii=False),
-        "findings": json.dumps(dict(results.findings), ensure_ascii=False),
         "faults": json.dumps(results.faults, ensure_ascii=False),
     }
+    for name in STORED_TEXTS:
+        attributes[name] = json.dumps(dict(getattr(results, name)), ensure_ascii=False)
     path = folder / f"{int(names[0]):016x}-{int(names[-1]):016x}-{len(names)}{CHUNK_FILE_ENDING}"
     write_arrays(data, attributes, path)
     return path
@@ -76,7 +76,7 @@ def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
         words = [word.replace(" ", "_") for word in outcome.meanings]
         results = CaseResults(np.array(words, object)[outcome.values])
         results.units.update(json.loads(attributes["measures"]))
-        for part in ("messages", "findings"):
+        for part in STORED_TEXTS:
             texts = json.loads(attributes[part])
             getattr(results, part).update({int(case): text for case, text in texts.items()})
         results.faults += json.loads(attributes["faults"])

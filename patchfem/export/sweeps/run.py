@@ -1,6 +1,6 @@
 """Computation of a sweep into its folder, which reuses existing results and writes the tables."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -14,16 +14,15 @@ from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.sweep import WorkerData, iterate_chunks
 from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Missing, PatchfemError
-from ...disk.atomic_write import write_rows
 from ...runs.batch.case_results import CaseResults
 from .. import page as pages
 from .. import store as answers
 from ..answer import Answer
-from .answer import identify_sweep, make_sweep_answer, read_tolerance, sort_measures
+from .answer import identify_sweep, make_sweep_answer, read_tolerance
+from .csv_columns import write_csv
 from .folder import Folder, Writer
 
 MAX_CASES_WITH_SUMMARY = 1000  # cases whose summaries are stored by default
-N_ROWS_PER_PART = 4096  # rows of sweep.csv whose cells are in memory at the same time
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,55 +195,6 @@ def write_tables(
     if page:
         pages.write_report(folder.target)
     return answers.read_answer(folder.target)
-
-
-def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path: Path) -> None:
-    """Write sweep.csv.
-
-    A row has the swept keys as written, the outcome, every measure with its error in SI, the message
-    of a failed case, and the name of its folder. A missing number is "".
-
-    Parameters
-    ----------
-    cases : Cases
-        Values of the keys in each case.
-    table : SweepTable
-        Measures and outcome of each case.
-    case_folders : sequence of str
-        Folders of the cases; empty if there are none.
-    path : Path
-        File to write.
-    """
-    names = sort_measures(table)
-    measures = list(chain.from_iterable((name, f"{name}_error") for name in names))
-    header = [*(axis.key for axis in cases.axes), "outcome", *measures, "message"]
-    header += ["case"] * bool(case_folders)
-
-    def make_rows(part: slice) -> Iterator[tuple[str, ...]]:
-        """Return the rows of some cases."""
-        numbers = range(len(table))[part]
-        columns = []
-        for axis, indices in zip(cases.axes, cases.axis_indices(np.asarray(numbers))):
-            columns.append([axis.texts[index] for index in indices.tolist()])
-        columns.append(map(str, table.outcome[part]))
-        for column in map(table.measures.get, names):
-            columns.append(_format_numbers(column.values[part], "%r"))
-            columns.append(_format_numbers(column.errors[part], "%.6g"))
-        columns.append([table.messages.get(number, "") for number in numbers])
-        if case_folders:
-            columns.append(case_folders[part])
-        return zip(*columns, strict=True)
-
-    # The rows are made in parts, because the cells of all cases would fill the memory.
-    starts = range(0, len(table), N_ROWS_PER_PART)
-    parts = (make_rows(slice(start, start + N_ROWS_PER_PART)) for start in starts)
-    write_rows(path, chain([header], chain.from_iterable(parts)))
-
-
-def _format_numbers(numbers: np.ndarray, number_format: str) -> list[str]:
-    """Return numbers as strings; "" for NaN."""
-    values = numbers.astype(float).tolist()
-    return ["" if value != value else number_format % value for value in values]
 
 
 def compute_in_memory(

@@ -16,6 +16,8 @@ from ..results.patch_rows import Arrays, Measures
 
 # Columns of texts of `CaseResults`
 TEXT_COLUMNS = ("messages", "findings", "warnings", "notes", "numerics")
+# Those that a sweep stores of each case (`export.sweeps.folder`)
+STORED_TEXTS = ("messages", "findings")
 FAILED_OUTCOME = "failed"  # outcome of a case that was rejected or ended with an error
 
 

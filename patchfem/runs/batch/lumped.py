@@ -6,7 +6,7 @@ is computed by a single run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from time import process_time
 from typing import NamedTuple
 
@@ -54,6 +54,7 @@ from ...points.cases import CaseMarch, is_linear_between_events, list_parameters
 from ...points.laws import N_NUMBERS, POINT_LAWS, list_point_law
 from ...points.rows import Cases, Law, LawNumber, Number
 from ...scene.rules.accuracy import list_fixed_settings
+from ..refine import NO_LIMIT, Verdict, refine
 from ..results.notes import MAX_WORK_CHECK
 from ..results.result import shorten_file_names
 from ..rig.motion_warnings import note_on_creep
@@ -142,6 +143,19 @@ class Refined(NamedTuple):
     is_met: np.ndarray
 
 
+class OpenMarch(NamedTuple):
+    """Cases of a group that miss their tolerance, (n,) each.
+
+    - level: index of the number of steps of the last march in BATCH_STEPS_PER_CYCLE.
+    - numbers: indices of the cases.
+    - coarser: values (n,) by name of the last march, and of the one before if there is one.
+    """
+
+    level: int
+    numbers: np.ndarray
+    coarser: list[dict[str, np.ndarray]]
+
+
 def find_group(model: Model) -> tuple[int, str] | None:
     """Return a key that is equal for models that one call of the kernel computes, or None if it cannot compute a model.
 
@@ -211,7 +225,7 @@ def _solve_part(models: Sequence[Model], report: Callable | None) -> CaseResults
     group = collect_cases(models)
     results = CaseResults.blank(len(models))
     is_alone = np.ones(len(models), bool)
-    for indices, refined in refine(group):
+    for indices, refined in march_group(group):
         part = _select(group, indices)
         part_results = make_results(select_models(models, indices), part, refined)
         is_alone[indices] = needs_single_run(part, refined, part_results)
@@ -264,46 +278,65 @@ def _may_create_energy(model: Model):
     return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
 
 
-def refine(group: Group) -> Iterator[tuple[np.ndarray, Refined]]:
+def march_group(group: Group) -> list[tuple[np.ndarray, Refined]]:
     """March cases, and those that miss their tolerance again with more steps.
 
-    Yields indices of cases and their march, for those that meet their tolerance after each march, and at the end for the
+    Returns indices of cases and their march, for those that meet their tolerance after each march, and at the end for the
     others. The errors follow from the one or two marches before, with fewer steps. Exact steps need a single march; cases
     without a closed form are left out.
     """
-    remaining = np.arange(len(group.tolerance))
     if is_linear_between_events(group.cases):
-        remaining = np.flatnonzero(has_closed_form(group))
-        if remaining.size:
-            part = _select(group, remaining)
-            march = march_cases(part.cases, EXACT_STEPS_PER_CYCLE)
-            errors = estimate_exact_errors(part, march)
-            is_met = np.ones(remaining.size, bool)
-            yield remaining, Refined(march, errors, EXACT_STEPS_PER_CYCLE, is_met)
-        return
+        numbers = np.flatnonzero(has_closed_form(group))
+        if not numbers.size:
+            return []
+        part = _select(group, numbers)
+        march = march_cases(part.cases, EXACT_STEPS_PER_CYCLE)
+        errors = estimate_exact_errors(part, march)
+        is_met = np.ones(numbers.size, bool)
+        return [(numbers, Refined(march, errors, EXACT_STEPS_PER_CYCLE, is_met))]
 
-    coarser = [march_cases(group.cases, BATCH_STEPS_PER_CYCLE[0]).values]
-    for count in BATCH_STEPS_PER_CYCLE[1:]:
-        part = _select(group, remaining)
+    done = []
+
+    def march(level: int, before: OpenMarch) -> OpenMarch:
+        """March the open cases with more steps, and put those that end with it into the list."""
+        count = BATCH_STEPS_PER_CYCLE[level]
+        part = _select(group, before.numbers)
         fine = march_cases(part.cases, count)
-        errors = estimate_errors(part, fine, coarser)
-        is_met = np.ones(remaining.size, bool)
-        for name in fine.values.keys() - set(INTERNAL_VALUES):
-            value = fine.values[name]
-            allowed = part.tolerance * np.abs(value) + find_floor(name, fine.values, part)
-            # A measure that only one of the two marches has shows an event that the other missed.
-            is_absent = np.isnan(value) & np.isnan(coarser[0][name])
-            is_met &= (errors[name] <= allowed) | is_absent
+        errors = estimate_errors(part, fine, before.coarser)
+        is_met = _find_met_cases(part, fine, errors, before.coarser[0])
 
         # Only cases beyond their tolerance are marched again.
         is_done = is_met | (count == BATCH_STEPS_PER_CYCLE[-1])
         if is_done.any():
             parts = (_select(one, is_done) for one in (fine, errors))
-            yield remaining[is_done], Refined(*parts, count, is_met[is_done])
-        remaining = remaining[~is_done]
-        if not remaining.size:
-            return
-        coarser = [_select(values, ~is_done) for values in (fine.values, coarser[0])]
+            done.append((before.numbers[is_done], Refined(*parts, count, is_met[is_done])))
+        coarser = [_select(values, ~is_done) for values in (fine.values, before.coarser[0])]
+        return OpenMarch(level, before.numbers[~is_done], coarser)
+
+    def judge(left: OpenMarch, excesses: list[float]) -> Verdict:
+        """Go on with the cases that are left."""
+        n_left = left.numbers.size
+        return Verdict(float(n_left), left.level + 1 if n_left else None)
+
+    coarse = march_cases(group.cases, BATCH_STEPS_PER_CYCLE[0]).values
+    start = OpenMarch(0, np.arange(len(group.tolerance)), [coarse])
+    refine(lambda level, before: march(level, before or start), 1, judge, NO_LIMIT)
+    return done
+
+
+def _find_met_cases(group: Group, fine: CaseMarch, errors, coarse) -> np.ndarray:
+    """Return whether all measures of each case (n,) meet the tolerance.
+
+    `errors` and `coarse` are the errors of the march and the values of the one before, (n,) by name.
+    """
+    is_met = np.ones(len(group.tolerance), bool)
+    for name in fine.values.keys() - set(INTERNAL_VALUES):
+        value = fine.values[name]
+        allowed = group.tolerance * np.abs(value) + find_floor(name, fine.values, group)
+        # A measure that only one of the two marches has shows an event that the other missed.
+        is_absent = np.isnan(value) & np.isnan(coarse[name])
+        is_met &= (errors[name] <= allowed) | is_absent
+    return is_met
 
 
 def find_repeat_error(group: Group, march: CaseMarch) -> np.ndarray:

@@ -4,7 +4,7 @@ In: a model with [slide] and its Patch with the static contact solution, or None
 Out: a `BenchRun`. The pieces may be rigid or deform in shear.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
@@ -95,7 +95,8 @@ def run_bench(model, patch, steps: int, n_frames: int = 0, choice=None, **option
         Path and callbacks of `follow_slide`.
     """
     numerics = make_bench_numerics(model, steps, options.get("path"))
-    numerics = replace(numerics, choice=numerics.choice and (choice or numerics.choice))
+    own = numerics.space.choice
+    numerics = numerics.vary_space(choice=own and (choice or own))
     return follow_slide(model, numerics, patch, n_frames, **options)
 
 

@@ -4,7 +4,8 @@ In: a model with [slide]. Out: `Numerics`, steps per cycle and `BenchSizes`. A l
 parallel elements obey Masing's rules; contact points and lists of bonds use the compiled kernels of the rigs.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from math import ceil
 from typing import NamedTuple
 
@@ -25,18 +26,11 @@ CONTACT_POINTS = "contact points"
 BOND_LIST = "bond list"
 
 
-@dataclass(frozen=True, slots=True)
-class Numerics:
-    """Numerical settings of a run of a rig or a bench.
+class SpaceSettings(NamedTuple):
+    """What represents the interfaces and the structure in a run, and what is coarser or other in its comparison runs.
 
-    - engine: name of the engine.
-    - steps: time steps per cycle; of the engine `event_driven` the smallest number per shortest period of the drive.
-    - cycles, window: number of cycles of the run, and of the window at its end.
     - shear_modes: number of shear modes; None: set by the tolerance.
     - choice: method of bond summation; None: set by the tolerance and the steps.
-    - whole: whether the run stores the histories before the window, or draws the response curve beside its peak; coarse runs
-      may omit them.
-    - local: largest relative error per step of the engine `event_driven`.
     - other_rig: index of the rig with other modes of a reduced structure, or None.
     - meshed: indices of the interfaces whose patches have a coarser mesh.
     - coarse_patch: how many times the mesh of the patch of [contact] is coarser by a factor of 2.
@@ -44,19 +38,35 @@ class Numerics:
     - has_half_cells: whether Iwan models of time steps have half their cells.
     """
 
-    engine: str
-    steps: int
-    cycles: float
-    window: int
-    shear_modes: int | None
+    shear_modes: int | None = None
     choice: "friction.bonds.engines.EngineChoice | None" = None
-    whole: bool = True
-    local: float = 0.0
     other_rig: int | None = None
     meshed: tuple[int, ...] = ()
     coarse_patch: int = 0
     stiffer_joint: bool = False
     has_half_cells: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Numerics:
+    """Numerical settings of a run of a rig or a bench.
+
+    - engine: name of the engine.
+    - steps: time steps per cycle; of the engine `event_driven` the smallest number per shortest period of the drive.
+    - cycles, window: number of cycles of the run, and of the window at its end.
+    - space: SpaceSettings.
+    - whole: whether the run stores the histories before the window, or draws the response curve beside its peak; coarse runs
+      may omit them.
+    - local: largest relative error per step of the engine `event_driven`.
+    """
+
+    engine: str
+    steps: int
+    cycles: float
+    window: int
+    space: SpaceSettings = field(default_factory=SpaceSettings)
+    whole: bool = True
+    local: float = 0.0
 
     def finer(self):
         """Return finer settings for the next run.
@@ -66,6 +76,10 @@ class Numerics:
         if self.local:
             return replace(self, local=max(0.01 * self.local, MIN_RELATIVE_STEP_ERROR))
         return replace(self, steps=2 * self.steps)
+
+    def vary_space(self, **changes) -> "Numerics":
+        """Return settings with other SpaceSettings."""
+        return replace(self, space=self.space._replace(**changes))
 
 
 def make_bench_numerics(
@@ -86,7 +100,7 @@ def make_bench_numerics(
     if find_method(model).startswith(BOND_LIST):
         slide = sample_path(model, steps, path).rel_disp
         choice = bond_lists.choose_slide_summation(model, slide)
-    return Numerics("bench", steps, model.slide.cycles, 1, None, choice)
+    return Numerics("bench", steps, model.slide.cycles, 1, SpaceSettings(choice=choice))
 
 
 def find_method(model) -> str:
@@ -172,10 +186,11 @@ class BenchSizes(NamedTuple):
     samples: int
 
 
+@lru_cache(8)
 def count_bench_sizes(model) -> BenchSizes:
     """Count the unknowns and the samples of a bench run."""
     steps = steps_per_cycle(model)
-    choice = make_bench_numerics(model, steps).choice
+    choice = make_bench_numerics(model, steps).space.choice
     unknowns = {}
     if choice is not None and choice.strips:
         unknowns["bond_list_about"] = int(choice.strips)

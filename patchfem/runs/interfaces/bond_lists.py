@@ -89,8 +89,8 @@ def choose_bond_summation(model: Model, numerics):
     For a block held by the law as printed in the 1985 report it is reduced to STICKING_STROKE_RATIO. Of several interfaces,
     the narrowest strips serve all lists.
     """
-    if numerics.choice is not None:
-        return numerics.choice
+    if numerics.space.choice is not None:
+        return numerics.space.choice
     drive = model.rig.drive
     choices = []
     for number, interface in enumerate(model.rig.friction.interfaces):

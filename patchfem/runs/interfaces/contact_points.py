@@ -21,7 +21,7 @@ from ...time_steps import contacts, laws, systems
 from ...time_steps.contacts import PointSet
 from ..patch import store
 from . import averaged_law, bands, bond_lists
-from .joints import Joint, find_climbed_grooves, has_elements, list_joints
+from .joints import SlidingPart, find_climbed_grooves, has_elements, list_joints
 
 # Largest number of shear modes that the tolerance asks for; for Coulomb's law, whose points have the compliance of the
 # modes left out, 16 of them give the loop area an error of 5e-4.
@@ -58,7 +58,7 @@ def make_contact(model: Model, numerics, patch) -> contacts.Contact:
         None under [normal] and between masses.
     """
     rig = model.rig
-    joints = list_joints(model, patch, numerics.meshed)
+    joints = list_joints(model, patch, numerics.space.meshed)
     fields = _find_load(model, patch) if joints else {}
 
     # Parallel elements represent an interface exactly under a constant load; its nodes or shear modes serve all other
@@ -139,7 +139,7 @@ def _find_load(model: Model, patch) -> dict:
     return {"press": press, "preload": float(force.sum())}
 
 
-def make_points(joint: Joint, numerics, *, moves: bool = False) -> PointSet:
+def make_points(joint: SlidingPart, numerics, *, moves: bool = False) -> PointSet:
     """Return the points of an interface or a band.
 
     Laws without memory, and points that slide alike under a pressure that moves with them, act on the resultant. Others
@@ -147,7 +147,7 @@ def make_points(joint: Joint, numerics, *, moves: bool = False) -> PointSet:
 
     Parameters
     ----------
-    joint : Joint
+    joint : SlidingPart
         Interface with its load.
     numerics : Numerics
         Number of shear modes, by default that of the scene or by the tolerance; number of cells; bond summation.
@@ -210,7 +210,7 @@ def make_points(joint: Joint, numerics, *, moves: bool = False) -> PointSet:
         # A single point on a prescribed slide takes little time.
         is_cheap = joint.row.size == 0 and np.size(load) == 1
         n_cells = laws.N_CELLS * (CELLS_FACTOR if is_cheap else 1)
-        n_cells = n_cells // 2 if numerics.has_half_cells else n_cells
+        n_cells = n_cells // 2 if numerics.space.has_half_cells else n_cells
         points = laws.make_iwan(law, np.maximum(load, MIN_LOAD), n_cells)
     elif limits is None:
         points = laws.make_point_law(keys.law, law, load, rest)
@@ -223,7 +223,7 @@ def make_points(joint: Joint, numerics, *, moves: bool = False) -> PointSet:
     return PointSet(points, joint.row, nodes, modes, lower=lower, bond_sum=bond_sum)
 
 
-def _place_on_lower_piece(joint: Joint, limits) -> contacts.LowerPressure | None:
+def _place_on_lower_piece(joint: SlidingPart, limits) -> contacts.LowerPressure | None:
     """Return the places of the points of a joint over the pressure of the lower piece; None if the upper piece has it.
 
     One point carries the whole load under a law without memory on rigid pieces. Its table has slides and relative loads in
@@ -257,7 +257,7 @@ def _place_on_lower_piece(joint: Joint, limits) -> contacts.LowerPressure | None
     return contacts.LowerPressure(np.zeros(1), np.array([load]), tuple(tables))
 
 
-def _choose_modes(joint: Joint, law, numerics, *, moves: bool) -> shear_modes.ShearModes:
+def _choose_modes(joint: SlidingPart, law, numerics, *, moves: bool) -> shear_modes.ShearModes:
     """Return the shear modes of the pieces of a joint, which the cache keeps for all runs with the same Patch.
 
     Without a number of modes the neglected ones change the backbone curve of the interface by at most
@@ -265,7 +265,7 @@ def _choose_modes(joint: Joint, law, numerics, *, moves: bool) -> shear_modes.Sh
 
     Parameters
     ----------
-    joint : Joint
+    joint : SlidingPart
         Interface whose pieces deform in shear.
     law : friction law or Bonds
         Law of the points.
@@ -279,7 +279,7 @@ def _choose_modes(joint: Joint, law, numerics, *, moves: bool) -> shear_modes.Sh
     force = joint.node_loads
     accuracy = joint.model.accuracy
     bound = SHEAR_MODES_ERROR_RATIO * accuracy.tolerance
-    count = numerics.shear_modes or accuracy.shear_modes
+    count = numerics.space.shear_modes or accuracy.shear_modes
     is_below = patch.model.gap.side == "lower" and joint.model.grooves is None
     most = MAX_STIFF_MODES if keys.law in laws.STIFF_LAWS else MAX_MODES
 

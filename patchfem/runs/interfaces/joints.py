@@ -1,7 +1,7 @@
 """Interfaces of a rig or a bench with their laws, loads and patches, from which each engine makes its own form.
 
-In: a Model and its Patch. Out: `Joint`s. A patch that slips part by part under a constant load is its exact set of Jenkins
-elements.
+In: a Model and its Patch. Out: `SlidingPart`s. A patch that slips part by part under a constant load is its exact set of
+Jenkins elements.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..results.interfaces import depends_on_pressure
 from . import bands
 
 
-class Joint(NamedTuple):
+class SlidingPart(NamedTuple):
     """Interface of a rig or a bench, or a band of its face that slides apart, under its load.
 
     - model: Model, with the expected speed of the slide.
@@ -78,7 +78,7 @@ class Joint(NamedTuple):
         find = getattr(self.make_law(), "elements", None)
         return find(self.load) if find else (np.zeros(0), np.zeros(0))
 
-    def split_by_bands(self) -> list[Joint]:
+    def split_by_bands(self) -> list[SlidingPart]:
         """Return the bands of a face that slide apart, or the joint itself."""
         if not (self.model.rig and self.model.rig.friction.bands_slide_apart):
             return [self]
@@ -90,7 +90,7 @@ class Joint(NamedTuple):
         return parts
 
 
-def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
+def list_joints(model: Model, patch, meshed=()) -> list[SlidingPart]:
     """Return the interfaces of a rig or a bench with their laws and loads, or [] without friction.
 
     Parameters
@@ -106,7 +106,9 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
     rows = [np.zeros(0)] if model.rig is None else model.rig.modes.interfaces
     if model.friction is not None and (patch is not None or model.rig is None):
         load = model.point.load if patch is None else float(patch.pressure.load)
-        return [Joint(model, model.friction, load, load, rows[0], patch, bool(model.partial_slip))]
+        return [
+            SlidingPart(model, model.friction, load, load, rows[0], patch, bool(model.partial_slip))
+        ]
     joints = []
     for k, interface in enumerate(interfaces):
         load = model.point.load if interface.load is None else interface.load
@@ -116,11 +118,11 @@ def list_joints(model: Model, patch, meshed=()) -> list[Joint]:
             solved = faces.solve_contact_on_meshes(interface, model.accuracy.tolerance)
             own = solved[int(k in meshed)]
         is_soft = bool(interface.partial_slip)
-        joints.append(Joint(model, interface.numbers, load, load, rows[k], own, is_soft))
+        joints.append(SlidingPart(model, interface.numbers, load, load, rows[k], own, is_soft))
     return joints
 
 
-def list_parts(model: Model, patch, meshed=()) -> list[Joint]:
+def list_parts(model: Model, patch, meshed=()) -> list[SlidingPart]:
     """Return the interfaces of a model, or the bands of its face that slide apart.
 
     Parameters

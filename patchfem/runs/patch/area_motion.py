@@ -41,7 +41,7 @@ def find_face_reversal(result, patch: AreaPatch) -> "first_loading.ReversalState
         return None
 
     # Half the range of the slide in the last cycle
-    period = model.slide.period if model.rig is None else result.motion.period
+    period = model.slide.period if model.rig is None else result.histories.period
     if not period:
         return None
     is_last = window.time >= window.time[-1] - period * (1 + 1e-9)

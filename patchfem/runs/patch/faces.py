@@ -1,27 +1,27 @@
 """Patches of the interfaces of a rig.
 
-In: a model whose interfaces have patches. Out: `Face`s with solved patches on two or more meshes.
+In: a model whose interfaces have patches. Out: `PressedFace`s with solved patches on two or more meshes.
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 from ...core import PatchfemError
-from ..results.interfaces import Face
+from ..results.interfaces import PressedFace
 from . import mesh_levels
 from .press import Patches
 
 
-def solve_interface_patches(model) -> Iterator[Face]:
+def solve_interface_patches(model) -> Iterator[PressedFace]:
     """Solve the static contact of each interface of a rig that has a patch of its own.
 
-    Yields a Face for each of them, with its number and name, its Model, and the patch on its meshes.
+    Yields a PressedFace for each of them, with its number and name, its Model, and the patch on its meshes.
     """
     rig = model.rig
     for number, interface in enumerate(rig.friction.interfaces if rig is not None else ()):
         if interface.patch is not None:
             interface_model = replace(model, patch=interface.patch, friction=interface.numbers)
-            yield Face(
+            yield PressedFace(
                 number,
                 rig.friction.names[number],
                 interface_model,

@@ -12,7 +12,7 @@ from ...mesh import pieces as piece_meshes
 from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
 from ...scene.keys.contact import Material
-from ..results.result import Result, RunInputs, collect_rest_frame
+from ..results.result import ContactData, Result, RunInputs, Statements, collect_rest_frame
 from . import skin, store
 from .measures import note_on_plane_state
 from .mesh_levels import solve_with_coarser
@@ -55,10 +55,8 @@ def make_static_result(inputs: RunInputs) -> Result:
         outcome=pressure.outcome,
         measures=dict(patch.measures),
         seconds=inputs.seconds,
-        warnings=warnings,
-        notes=inputs.notes,
-        patch=patch,
-        fields=collect_rest_frame(patch),
+        statements=Statements(warnings, inputs.notes),
+        contact=ContactData(patch, collect_rest_frame(patch)),
     )
 
 

@@ -1,6 +1,6 @@
 """Pressed interfaces of a run: the patch of [contact], or those of the interfaces of a rig.
 
-In: solved patches. Out: `Face`s, and findings that name the interfaces to which they belong.
+In: solved patches. Out: `PressedFace`s, and findings that name the interfaces to which they belong.
 """
 
 import re
@@ -12,7 +12,7 @@ import numpy as np
 from ...core import Outcome, add_interface_number, max_abs
 from ...effects import law_has_trait
 from ...formatting import format_length
-from .result import Finding, patch_surface
+from .result import AccuracyFinding, patch_surface
 
 
 def depends_on_pressure(keys, patch_model) -> bool:
@@ -25,7 +25,7 @@ def depends_on_pressure(keys, patch_model) -> bool:
     return bool(patch_model.interface.partial_slip) or not is_fixed
 
 
-class Face(NamedTuple):
+class PressedFace(NamedTuple):
     """Pressed interface of a run, on several meshes.
 
     - number: index of the interface.
@@ -78,7 +78,7 @@ class Face(NamedTuple):
 
 
 def merge_sentences(
-    model, faces: Iterable[Face], list_sentences: Callable[[Face], Iterable[str]]
+    model, faces: Iterable[PressedFace], list_sentences: Callable[[PressedFace], Iterable[str]]
 ) -> list[str]:
     """Merge sentences that are equal for several interfaces, and name these interfaces.
 
@@ -86,18 +86,20 @@ def merge_sentences(
     ----------
     model : Model
         Model of the run.
-    faces : iterable of Face
+    faces : iterable of PressedFace
         Pressed interfaces of the run.
     list_sentences : callable
-        Function that returns the sentences on a Face.
+        Function that returns the sentences on a PressedFace.
     """
-    findings = merge_findings(model, faces, lambda face: map(Finding, list_sentences(face)))
+    findings = merge_findings(model, faces, lambda face: map(AccuracyFinding, list_sentences(face)))
     return [finding.words for finding in findings]
 
 
 def merge_findings(
-    model, faces: Iterable[Face], list_findings: Callable[[Face], Iterable[Finding]]
-) -> list[Finding]:
+    model,
+    faces: Iterable[PressedFace],
+    list_findings: Callable[[PressedFace], Iterable[AccuracyFinding]],
+) -> list[AccuracyFinding]:
     """Merge findings that are equal for several interfaces, and name these interfaces.
 
     Scene keys are written as they occur in the scene.
@@ -106,19 +108,19 @@ def merge_findings(
     ----------
     model : Model
         Model of the run.
-    faces : iterable of Face
+    faces : iterable of PressedFace
         Pressed interfaces of the run.
     list_findings : callable
-        Function that returns the findings on a Face.
+        Function that returns the findings on a PressedFace.
     """
-    names_by_finding: dict[Finding, list[str]] = {}
+    names_by_finding: dict[AccuracyFinding, list[str]] = {}
     for face in faces:
         for finding in list_findings(face):
             words, advice = finding
             if advice is not None:
                 text = replace_contact_keys(model, advice.text)
                 advice = advice._replace(text=text, key=replace_contact_keys(model, advice.key))
-            merged = Finding(replace_contact_keys(model, words), advice)
+            merged = AccuracyFinding(replace_contact_keys(model, words), advice)
             names_by_finding.setdefault(merged, []).append(face.name)
     findings = []
     for finding, names in names_by_finding.items():

@@ -6,7 +6,7 @@ the numerical settings of the run.
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import field
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -60,7 +60,7 @@ class Advice(NamedTuple):
         return cls(f"set {key} = {value}", key, value)
 
 
-class Finding(NamedTuple):
+class AccuracyFinding(NamedTuple):
     """What a run found about the accuracy of its measures.
 
     - words: sentence without the advice.
@@ -94,7 +94,7 @@ class RunInputs:
     """Inputs of a run: plan, pressed interfaces, and the limits and callbacks of its caller.
 
     - plan: Plan to run.
-    - faces: pressed interfaces (`interfaces.Face`), with their worn surfaces.
+    - faces: pressed interfaces (`interfaces.PressedFace`), with their worn surfaces.
     - seconds: CPU seconds by step of the run; the run adds its own.
     - warnings, notes: sentences on the scene and the patch.
     - control: `refine.RunControl`, what the caller has set.
@@ -178,27 +178,39 @@ class SteadyData(NamedTuple):
 class MotionData(NamedTuple):
     """What a run knows of its motion beside measures and histories, each empty or None if there is nothing.
 
-    - period: period of the drive [s].
+    - settings: Settings.
     - energies: energies [J] and counters by name.
     - step_runs: `errors.StepRun` of the run and of its runs with fewer steps, from fine to coarse.
-    - levels: `events.Level` of each drive level.
+    - levels: `events.DriveLevel` of each drive level.
     - events: stick-slip Events.
     - decay: DecayCurve of a release.
     - spectra: Spectra under a random drive.
     - steady: SteadyData of a periodic motion.
     """
 
-    period: float | None = None
+    settings: Settings = Settings()
     energies: Values = MappingProxyType({})
     step_runs: "tuple[run_measures.errors.StepRun, ...]" = ()
-    levels: "tuple[run_measures.events.Level, ...]" = ()
+    levels: "tuple[run_measures.events.DriveLevel, ...]" = ()
     events: "run_measures.events.Events | None" = None
     decay: "run_measures.decay_curve.DecayCurve | None" = None
     spectra: "run_measures.stationary.Spectra | None" = None
     steady: SteadyData | None = None
 
 
-class WearHistory(NamedTuple):
+class StoredHistories(NamedTuple):
+    """Histories of a motion; None without motion.
+
+    - response, window: stored histories, and those of the last cycles.
+    - period: period of the drive [s]; None of a bench.
+    """
+
+    response: Response | None = None
+    window: Response | None = None
+    period: float | None = None
+
+
+class WornStates(NamedTuple):
     """States of wear, of which some have frames before those of the last cycle.
 
     - columns: measures over the cycles of wear (j,) by name.
@@ -211,45 +223,84 @@ class WearHistory(NamedTuple):
     period: float
 
 
+class ContactData(NamedTuple):
+    """Pressed pieces of a run, and their fields.
+
+    - patch: solved patch, or None.
+    - fields: arrays (frame, x) by name, with `time`.
+    - faces: interfaces of a rig that have a patch of their own (`interfaces.PressedFace`), with their fields.
+    - wear: WornStates of the patch, or None.
+    """
+
+    patch: object = None
+    fields: Arrays = MappingProxyType({})
+    faces: tuple = ()
+    wear: WornStates | None = None
+
+
+class Statements(NamedTuple):
+    """What a run says in words.
+
+    - warnings, notes: sentences.
+    - findings: `AccuracyFinding`s on measures that miss the tolerance; `warnings` has their sentences.
+    - yielding_faces: notes on surfaces that yield under the peak pressure, by Strength.
+    - shortage: Shortage if accuracy.max_seconds or accuracy.max_memory ended the refinement, else None.
+    """
+
+    warnings: list[str]
+    notes: list[str]
+    findings: tuple[AccuracyFinding, ...] = ()
+    yielding_faces: dict = MappingProxyType({})
+    shortage: Shortage | None = None
+
+
 @array_dataclass
 class Result:
     """Result of a run: measures, histories, fields, warnings and settings.
+
+    The fields of its records `statements`, `contact` and `histories`, and `motion.settings`, are attributes too.
 
     - plan: Plan that was run.
     - outcome: how the run ended.
     - measures: Measure by name.
     - seconds: CPU seconds by step of the run.
-    - warnings, notes: sentences.
-    - patch: solved patch, or None.
-    - fields: arrays (frame, x) by name, with `time`.
-    - response, window: stored histories, and those of the last cycles; None without motion.
-    - settings, motion: Settings and MotionData.
-    - wear: WearHistory of a patch, or None.
-    - findings: `Finding`s on measures that miss the tolerance; `warnings` has their sentences.
-    - faces: interfaces of a rig that have a patch of their own (`interfaces.Face`), with their fields.
-    - yielding_faces: notes on surfaces that yield under the peak pressure, by Strength.
-    - shortage: Shortage if accuracy.max_seconds or accuracy.max_memory ended the refinement, else None.
+    - statements: Statements.
+    - contact: ContactData.
+    - histories: StoredHistories.
+    - motion: MotionData.
     """
 
     plan: object
     outcome: Outcome
     measures: Measures
     seconds: Values
-    warnings: list[str]
-    notes: list[str] = field(default_factory=list)
-    patch: object = None
-    fields: Arrays = field(default_factory=dict)
-    response: Response | None = None
-    window: Response | None = None
-    settings: Settings = field(default_factory=Settings)
-    motion: MotionData = field(default_factory=MotionData)
-    wear: WearHistory | None = None
-    findings: tuple[Finding, ...] = ()
-    faces: tuple = ()
-    yielding_faces: dict = field(default_factory=dict)
-    shortage: Shortage | None = None
+    statements: Statements
+    contact: ContactData = ContactData()
+    histories: StoredHistories = StoredHistories()
+    motion: MotionData = MotionData()
 
     __getattr__ = refuse_attribute
+
+    warnings = property(lambda self: self.statements.warnings)
+    notes = property(lambda self: self.statements.notes)
+    findings = property(lambda self: self.statements.findings)
+    yielding_faces = property(lambda self: self.statements.yielding_faces)
+    shortage = property(lambda self: self.statements.shortage)
+    patch = property(lambda self: self.contact.patch)
+    fields = property(lambda self: self.contact.fields)
+    faces = property(lambda self: self.contact.faces)
+    wear = property(lambda self: self.contact.wear)
+    response = property(lambda self: self.histories.response)
+    window = property(lambda self: self.histories.window)
+    settings = property(lambda self: self.motion.settings)
+
+    def with_changes(self, **values) -> "Result":
+        """Return a Result with other values of its fields or of those of `statements` and `contact`."""
+        for name in ("statements", "contact"):
+            record = values.get(name, getattr(self, name))
+            own = {key: values.pop(key) for key in record._fields if key in values}
+            values[name] = record._replace(**own)
+        return replace(self, **values)
 
     def __repr__(self) -> str:
         measures = _format_count(len(self.measures), "measure")

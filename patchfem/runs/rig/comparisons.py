@@ -61,7 +61,7 @@ def list_time_runs(numerics: Numerics) -> ComparisonRuns:
 def find_bond_summation(model: Model, numerics: Numerics):
     """Return the EngineChoice by which time steps sum the bonds of a motion; None for other engines and laws."""
     if model.rig is None or numerics.engine != "march":
-        return numerics.choice
+        return numerics.space.choice
     if not _has_law_with(model, "bonds"):
         return None
     return bond_lists.choose_bond_summation(model, numerics)
@@ -102,7 +102,7 @@ def list_space_runs(
 
     def add(source: str, rule, *changes: dict) -> None:
         """Add an axis: the rule of its error, and the changes of the settings in its runs."""
-        runs = tuple(replace(base, **change) for change in changes)
+        runs = tuple(base.vary_space(**change) for change in changes)
         coarser_runs.append(CoarserRuns(runs, rule, beside if runs else None, source))
 
     if solution.steady is not None:
@@ -115,7 +115,7 @@ def list_space_runs(
     is_averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
     if n_coarse and (model.motion_depends_on_mesh or is_averaged):
         rule, n_meshes = _choose_patch_meshes(model, n_modes, has_steps=beside is not None)
-        modes = numerics.shear_modes if n_modes is None else n_modes
+        modes = numerics.space.shear_modes if n_modes is None else n_modes
         levels = range(1, 1 + min(n_coarse, n_meshes))
         add("mesh", rule, *({"coarse_patch": k, "shear_modes": modes} for k in levels))
 
@@ -141,8 +141,8 @@ def list_space_runs(
     if choice is not None and choice.find_error(ledger.get("join_error", 0.0)):
         add("bonds", partial(_bound_bond_errors, model, patch, solution, choice))
         if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:
-            narrow = replace(base, choice=_refine_bond_sum(choice))
-            same = replace(base, choice=choice)
+            narrow = base.vary_space(choice=_refine_bond_sum(choice))
+            same = base.vary_space(choice=choice)
             coarser_runs.append(CoarserRuns((narrow,), estimate_errors_from_finer, same, "bonds"))
 
     # A reduced structure neglects its highest modes. One run has more modes, another one half of them.
@@ -233,7 +233,7 @@ def list_joint_runs(inputs, space_runs: ComparisonRuns) -> ComparisonRuns:
     RunInputs of the run.
     """
     for coarser in space_runs if inputs.stiffer is not None else ():
-        if coarser.runs and coarser.runs[0].coarse_patch:
-            stiffer = replace(coarser.runs[0], coarse_patch=0, stiffer_joint=True)
+        if coarser.runs and coarser.runs[0].space.coarse_patch:
+            stiffer = coarser.runs[0].vary_space(coarse_patch=0, stiffer_joint=True)
             return [CoarserRuns((stiffer,), compute_absolute_changes, coarser.reference, "mesh")]
     return []

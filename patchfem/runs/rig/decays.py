@@ -106,7 +106,7 @@ def make_laws_on_mesh(model, patch, meshed=()) -> UndrivenRig:
         If a law has no steady loop.
     """
     settings = engines.choose_numerics(with_automatic_method(model))
-    return joints.make_undriven_rig(model, replace(settings, meshed=meshed), patch)
+    return joints.make_undriven_rig(model, settings.vary_space(meshed=meshed), patch)
 
 
 def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> list[UndrivenRig]:

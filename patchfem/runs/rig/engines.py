@@ -20,7 +20,7 @@ from ...model.model import Model
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ..bench import engine as bench_engine
-from ..bench.engine import MIN_RELATIVE_STEP_ERROR, Numerics
+from ..bench.engine import MIN_RELATIVE_STEP_ERROR, Numerics, SpaceSettings
 
 
 class Engine(NamedTuple):
@@ -229,7 +229,8 @@ def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     elif engine is MARCH and accuracy.steps_per_cycle is None:
         # The steps are short enough for a unique solution; comparison runs have half and a quarter of them.
         steps = 4 * ceil(max(steps, min_unique_steps(model)) / 4)
-    return Numerics(engine.name, steps, drive.cycles, window, accuracy.shear_modes, local=local)
+    space = SpaceSettings(accuracy.shear_modes)
+    return Numerics(engine.name, steps, drive.cycles, window, space, local=local)
 
 
 def min_unique_steps(model: Model) -> int:

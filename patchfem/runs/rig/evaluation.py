@@ -15,12 +15,17 @@ from ...core import Outcome, Response, SineDrive
 from ...cost_model import measure_cpu_time
 from ...effects import law_has_trait
 from ...formatting import format_length
-from ...measures.decay_curve import measure_last_cycle_amplitude
 from ...measures.events import Events, VibratingMode, is_all_stuck
 from ...measures.loops import CycleLoop, choose_reversal_force_rule, sample_loop
 from ...measures.measures import Values, compare_friction_works
 from ...measures.reasons import MAX_OTHER_MODES_FRACTION
-from ...measures.rows import AMPLITUDE, STEADY_AMPLITUDE, LastCycles, compute_measures
+from ...measures.rows import (
+    AMPLITUDE,
+    STEADY_AMPLITUDE,
+    LastCycles,
+    compute_measures,
+    measure_amplitude,
+)
 from ...motion_measures import find_extremes
 from ..results.result import SteadyData
 from .levels import LevelRuns, run_levels
@@ -150,8 +155,9 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
     # The errors of the motion grow with its size.
     run = solution.run
     window = see(run.window)
-    low, high = find_extremes(window.time, window.output, window.output_rate)
-    amplitude = (high - low) / 2
+    # A release has no gauge apart from the output.
+    extremes = find_extremes(window.time, window.output, window.output_rate)
+    amplitude = measure_amplitude(np.array(extremes))
     ratio = max(1.0, amplitude / max(solution.values[AMPLITUDE], 1e-300))
     steady = solution.steady
     if steady is not None:
@@ -293,9 +299,7 @@ class RunEvaluator:
             fields["reversal_rule"] = choose_reversal_force_rule(model)
             fields["ledger"] = run.response.extra.get("ledger")
         if model.rig.drive.is_release:
-            # The last whole cycle of a release may begin before the window.
-            motion = (run.response.time, run.response.output, run.response.output_rate)
-            fields["release"] = measure_last_cycle_amplitude(*motion, drive.period)
+            fields["release"] = run.response
 
         # What the engine knows better replaces what follows from samples.
         fields |= self.describe_cycles(run, drive)

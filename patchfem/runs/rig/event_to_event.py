@@ -30,7 +30,7 @@ from ...measures.events import (
     sort_events,
 )
 from ...measures.measures import Values
-from ...measures.rows import AMPLITUDE, find_definition, select_names
+from ...measures.rows import find_definition, select_names
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from ...structure.histories import find_accelerations
 from ..bench.masing import find_stretches
@@ -316,8 +316,6 @@ class LumpedEvaluator(RunEvaluator):
         }
         if not is_sinusoidal(drive):
             values |= dict.fromkeys(select_names("sine"))
-        if self.model.rig.drive.is_release:
-            del values[AMPLITUDE]  # The engine knows that of the window; see its row in the table.
         window = run.window
         if not self.has_friction:
             values |= dict.fromkeys(select_names("run"))

@@ -10,7 +10,7 @@ from ... import friction, partial_slip
 from ...effects import law_has_trait, needs_bond_list
 from ..interfaces import averaged_law, contact_points
 from ..patch import jenkins_elements
-from ..results.interfaces import Face
+from ..results.interfaces import PressedFace
 from ..results.patch_rows import Arrays
 from ..results.result import (
     N_INTERFACE_FRAMES,
@@ -74,7 +74,7 @@ def collect_interface_fields(model, numerics, patch, solution) -> Arrays:
     return make_interface_frames(patch, list_frames("time"), tau, local, list_frames("slide"))
 
 
-def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ...]:
+def add_slip_fields(model, faces: tuple[PressedFace, ...], snapshots) -> tuple[PressedFace, ...]:
     """Return interfaces of a rig with frames of their slip and shear stress.
 
     Without elements or snapshots, an interface has only the fields of its static contact.
@@ -83,7 +83,7 @@ def add_slip_fields(model, faces: tuple[Face, ...], snapshots) -> tuple[Face, ..
     ----------
     model : Model
         Model of the rig.
-    faces : tuple of Face
+    faces : tuple of PressedFace
         Pressed interfaces of the rig, in their order.
     snapshots : list
         States of the event-driven engine: time [s], and for each interface its slide [m] and the

@@ -18,7 +18,7 @@ from ...event_driven.laws import grooves, masing
 from ...event_driven.records import LawNumbers
 from ...model.model import Model
 from ..interfaces import averaged_law, bond_lists
-from ..interfaces.joints import Joint, find_climbed_grooves, list_parts
+from ..interfaces.joints import SlidingPart, find_climbed_grooves, list_parts
 
 NO_STEADY_LOOP = (
     'bonds have a steady loop only with friction.reading = "stretch", friction.order = 1, a constant bond length and '
@@ -31,7 +31,7 @@ NO_SOFT_LOOP = (
 MAX_STUCK_SLIP_RATIO = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
 
 
-def make_law(joint: Joint) -> LawNumbers:
+def make_law(joint: SlidingPart) -> LawNumbers:
     """Return the law of an interface as LawNumbers, the form for the engine `event_driven`."""
     elements = joint.elements
     if elements is not None:
@@ -41,7 +41,7 @@ def make_law(joint: Joint) -> LawNumbers:
     return laws.make_law(keys.law, joint.make_law(keys), joint.load, varies=varies)
 
 
-def make_load(joint: Joint) -> Load:
+def make_load(joint: SlidingPart) -> Load:
     """Return the normal load of an interface; that of a point may oscillate."""
     model = joint.model
     if not model.load_varies:
@@ -96,7 +96,7 @@ def make_joints(model: Model, numerics, patch) -> Joints:
     patch : Patch or None
         None without [contact].
     """
-    joints = list_parts(model, patch, numerics.meshed)
+    joints = list_parts(model, patch, numerics.space.meshed)
     pairs = []
     lengths = []
     for joint in joints:
@@ -143,7 +143,7 @@ def make_undriven_rig(model: Model, numerics, patch) -> UndrivenRig:
     PatchfemError
         If a law has no steady loop.
     """
-    joints = list_parts(model, patch, numerics.meshed)
+    joints = list_parts(model, patch, numerics.space.meshed)
     for joint in joints:
         if joint.is_soft and joint.elements is None:
             raise PatchfemError(NO_SOFT_LOOP)

@@ -1,6 +1,6 @@
 """Motions under a drive that changes its amplitude in levels, each from the end of the one before.
 
-In: a `RunEvaluator`. Out: the run joined over all levels, a `Level` with errors for each of them, and the level of the
+In: a `RunEvaluator`. Out: the run joined over all levels, a `DriveLevel` with errors for each of them, and the level of the
 onset, found by bisection.
 """
 
@@ -17,7 +17,7 @@ from ...core import Measure, Response, SineDrive
 from ...measures.errors import estimate_errors, split_errors
 from ...measures.events import (
     LEVEL_MEASURES,
-    Level,
+    DriveLevel,
     bracket_onset,
     join_events,
     make_no_onset_reason,
@@ -32,14 +32,14 @@ EXACT_RELATIVE_ERROR = 1e-9
 class LevelRuns(NamedTuple):
     """Levels of a run, in chronological order.
 
-    - levels: Level of each drive level.
+    - levels: DriveLevel of each drive level.
     - run_level: function (index, amplitude [m s-2]) that runs another level from the final state of the level with this
-      index, or from rest for the index -1, and returns its Level.
+      index, or from rest for the index -1, and returns its DriveLevel.
     - stick_tolerance: largest slip per cycle [m] at which the interface counts as stuck.
     """
 
-    levels: tuple[Level, ...]
-    run_level: Callable[[int, float], Level]
+    levels: tuple[DriveLevel, ...]
+    run_level: Callable[[int, float], DriveLevel]
     stick_tolerance: float
 
 
@@ -61,7 +61,7 @@ def run_levels(evaluator, n_frames: int = 0, progress=None):
     runs = []
 
     def solve(amplitude: float, before, n_frames: int = 0, report=None):
-        """Run a level, and return the run and its Level.
+        """Run a level, and return the run and its DriveLevel.
 
         Parameters
         ----------
@@ -79,9 +79,9 @@ def run_levels(evaluator, n_frames: int = 0, progress=None):
         values = evaluator.evaluate_measures(run, signal)
         values = {name: values[name] for name in LEVEL_MEASURES if name in values}
         errors = {name: EXACT_RELATIVE_ERROR * abs(value) for name, value in values.items()}
-        return run, Level(amplitude, evaluator.is_stuck(run), values, errors)
+        return run, DriveLevel(amplitude, evaluator.is_stuck(run), values, errors)
 
-    def run_level(number: int, amplitude: float) -> Level:
+    def run_level(number: int, amplitude: float) -> DriveLevel:
         """Run a level from the final state of level `number`, or from rest if it is -1."""
         return solve(amplitude, runs[number] if number >= 0 else None)[1]
 
@@ -192,7 +192,7 @@ def find_onset(found: LevelRuns, tolerance: float, is_past_onset) -> tuple[float
     tolerance : float
         Largest width of the bracket relative to the level.
     is_past_onset : callable
-        Function of a Level that returns whether the onset is reached.
+        Function of a DriveLevel that returns whether the onset is reached.
     """
     bracket = bracket_onset(found.levels, is_past_onset)
     if bracket is None:
@@ -246,7 +246,7 @@ def measure_onset_level(rig, found: LevelRuns, coarser, tolerance: float) -> Mea
     return Measure(factor * level, unit, factor * error, floor)
 
 
-def convert_to_scene_units(rig, levels) -> tuple[Level, ...]:
+def convert_to_scene_units(rig, levels) -> tuple[DriveLevel, ...]:
     """Return the drive levels of a run with their amplitudes in the unit of the scene: [m s-2], or [N] for a force."""
     unit, factor = _find_level_unit(rig)
     return tuple(replace(level, drive=factor * level.drive, unit=unit) for level in levels)

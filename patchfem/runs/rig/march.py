@@ -134,7 +134,7 @@ class MarchEvaluator(RunEvaluator):
         return peaks
 
     def describe_cycles(self, run, drive) -> dict:
-        """Return the check of the friction work, the friction loop, the energies, and the measures of a stuck interface.
+        """Return the check of the friction work, the friction loop, the energies, and the round-off of the slide.
 
         Parameters
         ----------
@@ -147,14 +147,11 @@ class MarchEvaluator(RunEvaluator):
             return {}
         rig = self.model.rig
         energies = run.ledger
-        missing = {}
         if self.contact.set_valued and self.is_stuck(run):
             # The remaining motion of a stuck interface is round-off, not slip. Its energies are compared with the kinetic
             # energy at the peak speed of the drive.
             moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
             energies = energies | {"power": energies["power"] + moving}
-            missing = {"slip_start_phase": None, "stick_fraction": 1.0}
-        values = {"work_check": compute_work_check(energies)} | missing
 
         # `window_work` is that of all interfaces, whose stops and releases within a step it contains; that of the first of
         # several ones is int F dx. Bands that yaw do more work than follows from their mean displacement.
@@ -169,7 +166,8 @@ class MarchEvaluator(RunEvaluator):
             force = compute_step_harmonic(window.time, run.step_force, find_drive_omega(drive))
             loop = compute_sampled_loop(window, drive, work * drive.period / span, force)
         return {
-            "integrated": values | self._find_release_forces(window),
+            "integrated": {"work_check": compute_work_check(energies)}
+            | self._find_release_forces(window),
             "run_energies": energies,
             "loop": loop,
             "slide_round_off": self.stick_tolerance if self.contact.set_valued else 0.0,

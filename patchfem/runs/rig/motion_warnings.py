@@ -26,7 +26,7 @@ from ...model import structure as model_structure
 from ...motion_measures import MAX_RESTING_SLIDE_RANGE
 from ..bench import bench
 from ..interfaces import joints
-from ..results.interfaces import Face, merge_sentences, warn_of_large_slide
+from ..results.interfaces import PressedFace, merge_sentences, warn_of_large_slide
 from ..results.notes import LAW_NOTES, LAW_WARNINGS
 from .engines import ENGINES, find_obstacle_of_map
 
@@ -68,7 +68,7 @@ def _warn_of_single_points(run) -> list[str]:
     if friction.load_varies or friction.bands_slide_apart or model.side == "lower":
         return []
 
-    def warn(face: Face) -> list[str]:
+    def warn(face: PressedFace) -> list[str]:
         """Return the warning on an interface."""
         law = face.model.friction
         has_friction = law is not None and law.static > 0 and not law_has_trait(law.law, "averaged")
@@ -224,7 +224,7 @@ def _note_on_elements_without_slip(run) -> Iterator[str]:
     if not (is_steady and is_found) or find_obstacle_of_map("piecewise", run.model):
         return
     slides = run.solution.run.window.slides.T
-    parts = joints.list_parts(run.model, run.patch, run.numerics.meshed)
+    parts = joints.list_parts(run.model, run.patch, run.numerics.space.meshed)
     for joint, slide in zip(parts, slides):
         _, yields = joint.list_elements()
         largest_yield = float(yields.max(initial=0.0))

@@ -1,6 +1,6 @@
 """Sizes, stiffnesses, frequencies and dimensionless groups of a rig for a plan.
 
-In: a Model. Out: numbers of unknowns, the stiffness chain, natural frequencies with free and stuck
+In: a Model. Out: the stiffness chain, natural frequencies with free and stuck
 interfaces, dimensionless groups, and sentences for the plan.
 """
 
@@ -8,14 +8,11 @@ from math import inf, pi
 
 import numpy as np
 
-from ... import partial_slip
 from ...core import add_interface_number, remove_interface_number
-from ...effects import law_has_trait
 from ...measures.measures import Values
 from ...model.model import Model
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ..interfaces import bond_lists
-from .engines import choose_numerics
 
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as
 # resonant.
@@ -84,20 +81,6 @@ def mode_frequencies(rig, chain: Chain) -> list[dict[str, str | float | None]]:
             }
         )
     return frequencies
-
-
-def count_unknowns(model: Model) -> dict[str, int]:
-    """Count the unknowns of a rig: modes, and for time steps the shear modes."""
-    counts = {"modes": len(model.rig.structure.frequencies)}
-    numerics = choose_numerics(model)
-    f = model.friction
-    if numerics.engine != "march" or f is None or not model.partial_slip:
-        return counts
-    has_bonds = model.grooves is None and law_has_trait(f.law, "bonds")
-    is_changed = has_bonds or model.grooves is not None or model.rig.friction.load_varies
-    if is_changed and not (has_bonds and bond_lists.has_bond_list(model)):
-        counts["shear_modes"] = numerics.shear_modes or partial_slip.shear_modes.N_SHEAR_MODES
-    return counts
 
 
 def compute_dimensionless_groups(model: Model) -> Values:

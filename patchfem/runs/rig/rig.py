@@ -35,7 +35,17 @@ from ..bench import engine as bench_engine
 from ..bench.engine import MIN_RELATIVE_STEP_ERROR, Numerics
 from ..interfaces import bond_lists
 from ..results.interfaces import check_pieces_overlap
-from ..results.result import N_INTERFACE_FRAMES, MotionData, Result, RunInputs, Settings, Shortage
+from ..results.result import (
+    N_INTERFACE_FRAMES,
+    ContactData,
+    MotionData,
+    Result,
+    RunInputs,
+    Settings,
+    Shortage,
+    Statements,
+    StoredHistories,
+)
 from . import comparisons, decays, event_to_event, flutter, levels, march, slides
 from . import fields as interface_fields
 from .engines import ENGINES, EVENT_DRIVEN, MARCH, MAX_MARCH_STEPS_PER_CYCLE, choose_numerics
@@ -135,10 +145,11 @@ class Runner:
             Number of frames of the interface in the last cycle.
         """
         model = self.model
-        patch = self.patches[numerics.coarse_patch]
-        if numerics.other_rig is not None:
-            model = replace(model, rig=model.rig.structure.other_rigs[numerics.other_rig])
-        if numerics.stiffer_joint:
+        space = numerics.space
+        patch = self.patches[space.coarse_patch]
+        if space.other_rig is not None:
+            model = replace(model, rig=model.rig.structure.other_rigs[space.other_rig])
+        if space.stiffer_joint:
             stiffer, (patch, *_) = self.stiffer[:2]
             model = replace(stiffer, rig=replace(stiffer.rig, drive=model.rig.drive))
 
@@ -307,7 +318,7 @@ def run_motion(inputs: RunInputs) -> Result:
     if run.has_friction and structure.drive_sizes.find_decay_rate(rig.modes) < 0:
         measures, notes = flutter.compute_flutter_amplitude(run)
         run = replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
-    return replace(_make_result(run), shortage=shortage)
+    return _make_result(run).with_changes(shortage=shortage)
 
 
 def _add_decay_curve(run: CoupledRun) -> CoupledRun:
@@ -358,6 +369,9 @@ def _make_result(run: CoupledRun) -> Result:
 
     # The slide at an interface may exceed the overlap of its pieces.
     outcome = run.outcome
+    histories = StoredHistories(motion.response, motion.response)
+    if model.rig is not None:
+        histories = StoredHistories(motion.response, motion.window, run.drive.period)
     for face in inputs.faces:
         slide = face.slide(motion.response)
         outcome = check_pieces_overlap(outcome, face.model.patch, face.patch, slide)
@@ -366,21 +380,16 @@ def _make_result(run: CoupledRun) -> Result:
         outcome=outcome,
         measures=measures,
         seconds=inputs.seconds,
-        warnings=[*inputs.warnings, *warnings],
-        notes=notes,
-        patch=inputs.patch,
-        fields=fields,
-        response=motion.response,
-        window=motion.response if model.rig is None else motion.window,
-        settings=run.settings,
+        statements=Statements([*inputs.warnings, *warnings], notes),
+        contact=ContactData(inputs.patch, fields, faces),
+        histories=histories,
         motion=_collect_motion_data(run),
-        faces=faces,
     )
 
 
 def _collect_motion_data(run: CoupledRun) -> MotionData:
     """Return what a motion has beside its measures, histories and fields."""
-    data = MotionData(step_runs=run.step_runs)
+    data = MotionData(run.settings, step_runs=run.step_runs)
     rig = run.model.rig
     if rig is None:
         return data
@@ -391,7 +400,6 @@ def _collect_motion_data(run: CoupledRun) -> MotionData:
         spectra = stationary.compute_spectra(motion.window, rig.drive.signal)
     found = solution.levels.levels if solution.levels is not None else ()
     return data._replace(
-        period=run.drive.period,
         energies=motion.ledger,
         levels=levels.convert_to_scene_units(rig, found),
         events=motion.log,
@@ -530,7 +538,7 @@ def _add_coarser_runs(run: CoupledRun, runs: ComparisonRuns, solved) -> CoupledR
     used_runs = [one for one in runs if one.runs or not solution.steady]
     pairs = []
     for one in used_runs:
-        if one.runs and one.runs[0].choice is None:
+        if one.runs and one.runs[0].space.choice is None:
             pairs.append((solved[one.runs[0]], one.reference and solved[one.reference]))
     if solution.levels is not None:
         found = levels.add_level_errors(solution.levels, used_runs, solved)

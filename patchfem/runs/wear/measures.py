@@ -14,7 +14,7 @@ from ...core import Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...measures.errors import estimate_convergence_errors
 from ..results.patch_rows import WORN_SOURCE, Arrays, Measures, Values, make_measure
-from ..results.result import UNBOUNDED_OUTCOMES, WearHistory
+from ..results.result import UNBOUNDED_OUTCOMES, WornStates
 from .evolve import (
     WORN_THROUGH_FRACTION,
     compute_mean_worn_depth,
@@ -62,12 +62,13 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
     if evolved is None:
         if is_unbounded:
             warning = f"nothing was worn: {result.outcome.sentence}"
-            return replace(result, warnings=[*result.warnings, warning])
+            return result.with_changes(warnings=[*result.warnings, warning])
         volume = _measure_point_volume(model, result, with_errors=with_errors)
         return replace(result, measures=result.measures | volume)
 
     warnings = [*result.warnings, *filter(None, [evolved.stopped])]
-    result = replace(result, seconds=result.seconds | {"wear": evolved.seconds}, warnings=warnings)
+    seconds = result.seconds | {"wear": evolved.seconds}
+    result = result.with_changes(seconds=seconds, warnings=warnings)
     if evolved.state is None:
         return result
 
@@ -94,7 +95,7 @@ def add_wear_measures(result, evolved, with_errors: bool = True):
         outcome = outcome if is_unbounded else Outcome.WORN_THROUGH
     warnings += [*_warn_of_worn_depth(model, evolved), *_warn_of_friction_table(model, evolved)]
     measures = result.measures | worn
-    result = replace(result, outcome=outcome, measures=measures, warnings=warnings, notes=notes)
+    result = result.with_changes(outcome=outcome, measures=measures, warnings=warnings, notes=notes)
     return _add_wear_frames(result, evolved)
 
 
@@ -405,8 +406,8 @@ def _add_wear_frames(result, evolved):
         for name, field in motion.items():
             before = wear.get(name, np.zeros((len(states), *field.shape[1:])))
             fields[name] = np.concatenate([before, field])
-    history = WearHistory(_collect_wear_history(evolved), len(states), period)
-    return replace(result, fields=fields, wear=history)
+    history = WornStates(_collect_wear_history(evolved), len(states), period)
+    return result.with_changes(fields=fields, wear=history)
 
 
 def _select_stored_moments(moments) -> np.ndarray:

@@ -22,7 +22,7 @@ MAX_SHOWN_CHARACTERS = 60  # largest number of characters of a wrong value in a 
 _UNSPECIFIC_REQUIREMENTS = ("a plain", "a whole", "a text", "plain", "whole", "two whole")
 
 
-class Limit(NamedTuple):
+class KeyLimit(NamedTuple):
     """Bound of a number: its `name` in pydantic, such as "ge", and its `sign` in messages, such as ">="."""
 
     name: str
@@ -30,10 +30,10 @@ class Limit(NamedTuple):
 
 
 LIMITS_BY_ERROR_TYPE = {  # limit that a value breaks, by the type of the pydantic error
-    "greater_than": Limit("gt", ">"),
-    "greater_than_equal": Limit("ge", ">="),
-    "less_than": Limit("lt", "<"),
-    "less_than_equal": Limit("le", "<="),
+    "greater_than": KeyLimit("gt", ">"),
+    "greater_than_equal": KeyLimit("ge", ">="),
+    "less_than": KeyLimit("lt", "<"),
+    "less_than_equal": KeyLimit("le", "<="),
 }
 
 

@@ -47,7 +47,7 @@ VARIABLE_STIFFNESS_KEYS = (
 )
 
 
-class Joint(TableFacts):
+class DraftJoint(TableFacts):
     """Friction interface of a scene, with the properties that decide what it can be combined with.
 
     Parameters
@@ -171,17 +171,17 @@ class Joint(TableFacts):
 class Feature(NamedTuple):
     """Property of a joint that cannot be combined with every other.
 
-    - is_there: property of a Joint that tells whether it has the feature, or a function of it.
+    - is_there: property of a DraftJoint that tells whether it has the feature, or a function of it.
     - key: dotted key that causes it; "" for a mere condition. `{name}` in it, and in `words`, stands for a property of
       the joint.
     - words: text for messages; "" for the key itself.
     """
 
-    is_there: Callable[[Joint], Any] | str
+    is_there: Callable[[DraftJoint], Any] | str
     key: str = ""
     words: str = ""
 
-    def describes(self, joint: Joint) -> bool:
+    def describes(self, joint: DraftJoint) -> bool:
         """Return whether a joint has the feature."""
         name = self.is_there
         return bool(getattr(joint, name) if isinstance(name, str) else name(joint))
@@ -264,10 +264,10 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
     The combinations are the rows of UNSUPPORTED_COMBINATIONS, which are tried on each interface.
     """
     check_accuracy_method(draft, kind)
-    joints = [Joint(draft, "friction", draft.tables.friction, draft.tables.contact, kind)]
+    joints = [DraftJoint(draft, "friction", draft.tables.friction, draft.tables.contact, kind)]
     for index, interface in enumerate(draft.values.structure.interface if kind == "rig" else ()):
         table = interface.table
-        joints.append(Joint(draft, f"structure.interface.{index}", table, table.contact, kind))
+        joints.append(DraftJoint(draft, f"structure.interface.{index}", table, table.contact, kind))
     for joint in joints:
         # Many rows name the same feature, which is looked for only once.
         is_there = cache(lambda name, joint=joint: find_feature(name).describes(joint))
@@ -285,7 +285,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
 
 
 def describe_row(names: str, instead: str) -> str:
-    """Return the message of a row of UNSUPPORTED_COMBINATIONS, with names of properties of a `Joint` in braces.
+    """Return the message of a row of UNSUPPORTED_COMBINATIONS, with names of properties of a `DraftJoint` in braces.
 
     `names` are the features of the row, and `instead` is what the user can do, and why.
     """
