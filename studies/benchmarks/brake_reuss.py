@@ -14,7 +14,7 @@ which. At 20 um, where both tests can be compared, frequency and damping of the 
 those of the hammer test. This is more than the 95 % intervals of the shaker test (0.007 Hz, 5 %): the interval of one
 test does not contain the scatter between tests.
 
-The fitted values are: slip force 19.4 N (95 % interval 12.7 to 29.5 N), chi -0.035 (-0.29 to 0, the largest permitted),
+The fitted values are: slip force 19.3 N (95 % interval 12.9 to 29.1 N), chi -0.034 (-0.29 to 0, the largest permitted),
 damping ratio 1.41e-3 (1.31e-3 to 1.50e-3). The intervals assume independent residuals; those of one smooth decay are
 not independent, so the intervals are too narrow. Up to 314 um the joint is in micro-slip, where the measurements do not
 determine its stiffness (assumed): twice the stiffness with 4.1 times the slip force gives the same frequencies within
