@@ -328,10 +328,9 @@ def add_measures(
         patch = replace(patch, points=points, averaging=points.spacing)
         measures |= _select_more_accurate_measures(measures, points.measures)
         # The floors follow from the values of the points, if these are more accurate
-        values = {
-            name: np.nan if one.value is None else one.value for name, one in measures.items()
-        }
-        floors = compute_floors(values, tolerance or 0.0, patch.model.pieces.length)
+        values = dict.fromkeys(measures, np.nan)
+        known = {name: one.value for name, one in measures.items() if one.value is not None}
+        floors = compute_floors(values | known, tolerance or 0.0, patch.model.pieces.length)
     for (name, measure), floor in zip(measures.items(), floors):
         measures[name] = replace(measure, floor=float(floor))
     return replace(patch, measures=measures)
