@@ -158,9 +158,19 @@ def compute_stiffness(points, cells, element: Element, lam, mu) -> np.ndarray:
     return out.reshape(n_cells, 2 * k, 2 * k)
 
 
-def _integrate_over_parallelograms(
-    corners, element: Element
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+class GradientProducts(NamedTuple):
+    """Integrals (t, k, k) [1] of the products of the gradients of two nodes of t cells.
+
+    - xx, yy: of the derivatives along x, and of those inward.
+    - xy: of the derivative of the first node along x and that of the second one inward.
+    """
+
+    xx: np.ndarray
+    yy: np.ndarray
+    xy: np.ndarray
+
+
+def _integrate_over_parallelograms(corners, element: Element) -> GradientProducts:
     """Integrate products of gradients over cells whose map from the reference element is linear.
 
     The integrals are combinations of those over the reference element. They take a third of the time of an integration
@@ -172,11 +182,6 @@ def _integrate_over_parallelograms(
         Corners of the cells [m].
     element : Element
         Reference element with four corners.
-
-    Returns
-    -------
-    xx, yy, xy : (t, 4, 4) ndarray
-        Integrals of the products of the derivatives of two nodes along x, inward, and along x and inward [1].
     """
     _, local = element.evaluate(element.gauss)
     products = np.einsum("g,gai,gbj->abij", element.weights, local, local).reshape(4, 16)
@@ -191,7 +196,9 @@ def _integrate_over_parallelograms(
         factors = (first[:, None] * second).reshape(4, -1) / determinant
         return (factors.T @ products).reshape(-1, 4, 4)
 
-    return integrate(along, along), integrate(inward, inward), integrate(along, inward)
+    return GradientProducts(
+        integrate(along, along), integrate(inward, inward), integrate(along, inward)
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)

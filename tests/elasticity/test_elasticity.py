@@ -18,8 +18,7 @@ from patchfem.elasticity import (
     get_cells,
 )
 from patchfem.elasticity.elasticity import compute_stiffness
-from patchfem.mesh import TensorGrid, make_graded_grid
-from patchfem.mesh.elements import ELEMENTS
+from patchfem.mesh import ELEMENTS, TensorGrid, make_graded_grid
 
 materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
 planes = st.sampled_from(["strain", "stress"])

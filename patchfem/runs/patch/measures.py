@@ -145,10 +145,11 @@ def compute_floors(values: "Arrays | Values", tolerance: float, length: float) -
         Length [m] of the interface.
     """
     larger_terms = list_larger_terms(values, tolerance * length / 2)
-    zero = 0 * values["normal_load"]
-    return np.array(
-        [np.maximum(PATCH_TABLE[name].floor, larger_terms.get(name, 0.0) + zero) for name in values]
-    )
+    floors = []
+    for name, value in values.items():
+        floor = np.maximum(PATCH_TABLE[name].floor, larger_terms.get(name, 0.0))
+        floors.append(floor + np.zeros(np.shape(value)))
+    return np.array(floors)
 
 
 def compute_error_ratios(tolerance: float, values, errors, floors) -> np.ndarray:
