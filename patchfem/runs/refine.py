@@ -4,10 +4,9 @@ In: a function that solves a problem with a resolution, and one that judges the 
 the resolution along the axis that causes the errors of a measure (`find_refinable_axis`): the meshes of the patches or the
 steps of a bench (`judge_pass`), or the steps of a rig (`rig.run_refined`). A run that would not meet its tolerance within
 accuracy.max_seconds, or whose next mesh would exceed accuracy.max_memory, is not repeated; its result names the axis and the
-time or memory that would be needed. The same loop refines the meshes of a patch (`patch.mesh_levels`), its points
-(`patch.profile_points`) or cells (`patch.area`), the meshes of a group of patches (`patch.case_meshes`), the steps of cases
-at one point (`batch.lumped`), the models of a fit (`campaigns.fits`), and loops and amplitudes of a backbone
-(`campaigns.backbone`).
+time or memory that would be needed. The same loop refines the meshes of patches (`patch.case_meshes`), their points
+(`patch.profile_points`) or cells (`patch.area`), the steps of cases at one point (`batch.lumped`), the models of a fit
+(`campaigns.fits`), and loops and amplitudes of a backbone (`campaigns.backbone`).
 """
 
 from collections.abc import Callable, Hashable, Iterable

@@ -17,7 +17,8 @@ from patchfem.elasticity import (
     compute_displacement,
     get_cells,
 )
-from patchfem.mesh import TensorGrid, make_graded_grid
+from patchfem.elasticity.elasticity import compute_stiffness
+from patchfem.mesh import ELEMENTS, TensorGrid, make_graded_grid
 
 materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
 planes = st.sampled_from(["strain", "stress"])
@@ -101,3 +102,17 @@ def test_refuses_moduli_of_coating_and_substrate_too_far_apart():
     with pytest.raises(NotConverged, match=r"differ by a factor of 1e\+18: bring the moduli"):
         _ = pieces[0].factor
     assert pieces[1].factor and 1e-7 < pieces[1].round_off_error < 1e-2
+
+
+def test_exact_parallelogram_has_the_stiffness_of_the_integration_at_its_points():
+    """A parallelogram has the same stiffness among other parallelograms as beside a cell without parallel sides."""
+    points = np.array(
+        [[0.0, 0.0], [3e-3, 1e-4], [3.5e-3, 4e-4], [5e-4, 3e-4], [6e-3, 1e-4], [6.1e-3, 9e-4]]
+    )
+    cells = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
+    lam = np.array([1.1e11, 0.7e11])
+    mu = np.array([0.5e11, 0.8e11])
+    alone = compute_stiffness(points, cells[:1], ELEMENTS["quad"], lam[:1], mu[:1])
+    beside = compute_stiffness(points, cells, ELEMENTS["quad"], lam, mu)
+    np.testing.assert_allclose(alone[0], beside[0], rtol=0, atol=1e-14 * np.abs(alone).max())
+    assert not np.allclose(alone[0], beside[1], rtol=1e-3)

@@ -78,6 +78,21 @@ def test_exact_cases_agree_with_single_runs_on_the_same_mesh(extra):
             np.testing.assert_allclose(batch.floors[name][case], floor, rtol=1e-6)
 
 
+@pytest.mark.parametrize("extra", [TILT, TILT + STEP, SOFT_LAYER])
+def test_exact_single_run_is_a_batch_of_one(extra):
+    """A group with a single case has the meshes, and so the values, errors and floors, of the single run to 1e-12."""
+    patch = pf.build(load_scene(BLOCK + COATING + extra)).patch
+    batch = folder.case_meshes.solve_cases(patch, 1, TOLERANCE)
+    single = folder.mesh_levels.solve_with_coarser(patch, TOLERANCE)[0]
+    assert batch.facts[folder.cases.MeshFact.N_NODES, 0] == single.x.size
+    for name, measure in single.measures.items():
+        columns = (batch.values, batch.errors, batch.floors)
+        found = [column[name][0] for column in columns]
+        assert found == pytest.approx(
+            [measure.value, measure.error, measure.floor], rel=1e-12, nan_ok=True
+        )
+
+
 def test_always_failed_case_does_not_stop_the_others():
     """A load that cannot be computed with is refused with its error, and the other cases have their values."""
     group = make_group(BLOCK + COATING + TILT)

@@ -16,7 +16,7 @@ from ...core import PatchfemError
 from ...mesh.grading import Layout
 from ..refine import NO_LIMIT, refine
 from . import grids, profile_points
-from .cases import Batch, CaseMeasures, MeshFact, make_cases, take_patch
+from .cases import Batch, MeshFact, make_cases, take_patch
 from .condensed import condense
 from .contact_search import (
     MAX_GRADED_CONTACTS,
@@ -387,29 +387,19 @@ class _CaseSolver:
         nested : NestedMeshes
             Meshes of the cases.
         """
-        length = self.patch_model.pieces.length
-        tolerance = self.tolerance if self.patch_model.mesh.is_automatic else None
-        is_solved = np.ones(len(pressed), bool)
-        is_solved[list(errors)] = False
-        excess = np.full(len(pressed), np.inf)
         choices = [series]
         centre_error = None
         if nested.is_shared:
             # The errors that three meshes give hold as well as those with a coarser one, which are larger or smaller
             choices = [series[-grids.MIN_NESTED_MESHES :], series]
             centre_error = CENTRE_ERROR_IN_CELLS
+        facts = collect_facts(pressed)
+        excess = np.full(len(pressed), np.inf)
         for used in choices:
-            estimates = estimate_static_measures(pressed, used, tolerance, centre_error)
-            own_excess = estimates.excess(self.tolerance, length)
-            found = CaseMeasures(
-                estimates.names,
-                estimates.values,
-                estimates.errors,
-                estimates.floors(self.tolerance, length),
-                own_excess,
-                collect_facts(pressed),
-            )
-            self.batch.put(numbers[is_solved], found.take(is_solved))
+            estimates = estimate_static_measures(pressed, used, self.tolerance, centre_error)
+            own_excess = estimates.compute_excess(self.tolerance)
+            own_excess[list(errors)] = np.inf
+            self.batch.put(numbers, estimates, own_excess, facts)
             excess = np.minimum(excess, own_excess)
             if excess.max() <= 1:
                 break
@@ -459,6 +449,8 @@ def _split_rows(count: int, level: Level) -> list[np.ndarray]:
 
 def join_mesh_values(parts: Sequence[MeshValues]) -> MeshValues:
     """Return the measures of several parts of the cases on one mesh one after the other."""
+    if len(parts) == 1:
+        return parts[0]
     return MeshValues(
         parts[0].pair,
         {name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values},

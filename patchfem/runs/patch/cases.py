@@ -61,11 +61,9 @@ class Cases(NamedTuple):
 
     @property
     def variants(self) -> "list[tuple[float, Cases]]":
-        """Cases with a node at the step on its higher side (-1) and on its lower side (1); [] without a step."""
+        """Cases with a node at the step on its higher side (-1) and on its lower side (1), of gaps with a step."""
         variants = []
-        for side, change in zip(
-            (-1.0, 1.0), () if self.step_changes is None else self.step_changes.T
-        ):
+        for side, change in zip((-1.0, 1.0), self.step_changes.T):
             amplitudes = self.amplitudes.copy()
             amplitudes[:, -1] = change
             variants.append((side, self._replace(amplitudes=amplitudes)))
@@ -219,27 +217,6 @@ class MeshFact(IntEnum):
     STEEP_END = 2
 
 
-class CaseMeasures(NamedTuple):
-    """Measures of k cases on one mesh, as arrays (r, k) of r measures in SI units.
-
-    - names: names of the measures.
-    - values, errors, floors: NaN where there is none.
-    - excess (k,): largest ratio of error to allowed error of the measures that control the mesh.
-    - facts (f, k): rows `MeshFact` of the mesh.
-    """
-
-    names: tuple[str, ...]
-    values: np.ndarray
-    errors: np.ndarray
-    floors: np.ndarray
-    excess: np.ndarray
-    facts: np.ndarray
-
-    def take(self, rows) -> "CaseMeasures":
-        """Return selected cases; `rows` are indices or a mask (k,)."""
-        return CaseMeasures(self.names, *(column[..., rows] for column in self[1:]))
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Batch:
     """Static measures of n cases of a group.
@@ -276,26 +253,31 @@ class Batch:
             np.zeros((len(MeshFact), count)),
         )
 
-    def put(self, numbers: np.ndarray, measures: CaseMeasures) -> None:
-        """Store measures of some cases whose errors are smaller than those that they have.
+    def put(self, numbers: np.ndarray, estimates, excess: np.ndarray, facts: np.ndarray) -> None:
+        """Store measures of k cases whose errors are smaller than those that they have.
 
         Parameters
         ----------
         numbers : (k,) ndarray
             Numbers of the cases.
-        measures : CaseMeasures
+        estimates : StaticEstimates
             Their measures on a mesh.
+        excess : (k,) ndarray
+            Largest ratio of error to allowed error; inf for a case without measures.
+        facts : (f, k) ndarray
+            Rows `MeshFact` of the mesh.
         """
-        rows = np.flatnonzero(measures.excess < self.excess[numbers])
+        rows = np.flatnonzero(excess < self.excess[numbers])
         cases = numbers[rows]
-        for columns, new in zip((self.values, self.errors, self.floors), measures[1:4]):
-            for name, row in zip(measures.names, new):
+        new_columns = (estimates.values, estimates.errors, estimates.floors)
+        for columns, new in zip((self.values, self.errors, self.floors), new_columns):
+            for name, row in zip(estimates.names, new):
                 if name not in columns:
                     columns[name] = np.full(len(self), np.nan)
                 columns[name][cases] = row[rows]
 
-        self.excess[cases] = measures.excess[rows]
-        self.facts[:, cases] = measures.facts[:, rows]
+        self.excess[cases] = excess[rows]
+        self.facts[:, cases] = facts[:, rows]
         self.outcome[cases] = OutcomeCode.DONE
         for name in POSITIVE_MESH_MEASURES:
             is_unknown = (self.errors[name][cases] > 0) & (

@@ -97,6 +97,8 @@ def find_contact_places(pressed: PressedCases) -> ContactPlaces:
 
 def join_places(parts: Sequence[ContactPlaces]) -> ContactPlaces:
     """Return the contacts of several parts of the cases one after the other."""
+    if len(parts) == 1:
+        return parts[0]
     counts = [part.crossings.shape for part in parts]
     crossings = np.full((sum(n for n, _ in counts), max(e for _, e in counts)), np.nan)
     first = 0

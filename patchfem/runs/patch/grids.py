@@ -3,7 +3,7 @@
 In: a `PatchModel`. Out: the coarsest grids of its pieces. They depend on the patch alone, so that
 plans and runs use the same grids: the contact is searched for on columns that are graded to the
 result of the previous search. Every finer grid splits all cells in two, so that the grids for a
-small tolerance contain those for a large one. `mesh_levels` decides how many grids a run uses, and
+small tolerance contain those for a large one. `NestedMeshes` decides how many grids a run uses, and
 `plan` predicts their number. Read `make_base_grids` first, then `make_column_layout`.
 """
 

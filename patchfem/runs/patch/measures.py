@@ -96,6 +96,7 @@ class StaticEstimates(NamedTuple):
       load.
     - is_limit (k, n): whether the value is extrapolated to vanishing cells.
     - reasons: {reason: mask (n,) of the cases whose pressure is unbounded for this reason}.
+    - floors (k, n): absolute errors that are allowed at any tolerance (`compute_floors`); None before they are known.
     """
 
     names: tuple[str, ...]
@@ -103,6 +104,7 @@ class StaticEstimates(NamedTuple):
     errors: np.ndarray
     is_limit: np.ndarray
     reasons: Arrays
+    floors: np.ndarray | None = None
 
     def make_measures(self, case: int) -> Measures:
         """Return the static measures of the case with an index, by name, with errors and reasons of missing values."""
@@ -117,35 +119,37 @@ class StaticEstimates(NamedTuple):
                 out[name] = replace(out[name], value=None, error=None, reason=reason)
         return out
 
-    def floors(self, tolerance: float, length: float) -> np.ndarray:
-        """Return the absolute errors (k, n) that are allowed at any tolerance.
-
-        The floor of a measure that is a difference of larger terms is at least the tolerance times these terms
-        (`list_larger_terms`).
-
-        Parameters
-        ----------
-        tolerance : float
-            Relative tolerance; 0 raises no floor.
-        length : float
-            Length [m] of the interface.
-        """
-        floors = np.zeros(self.values.shape) + [[PATCH_TABLE[name].floor] for name in self.names]
-        values = dict(zip(self.names, self.values))
-        for name, size in list_larger_terms(values, tolerance * length / 2).items():
-            row = self.names.index(name)
-            floors[row] = np.maximum(floors[row], size)
-        return floors
-
-    def excess(self, tolerance: float, length: float) -> np.ndarray:
+    def compute_excess(self, tolerance: float) -> np.ndarray:
         """Return the largest ratios (n,) of error to allowed error of the measures that control the mesh.
 
-        Measures without value or error do not count. `tolerance` is relative, and `length` [m] that of the interface.
+        Measures without value or error do not count. `tolerance` is relative.
         """
         rows = [self.names.index(name) for name in MESH_MEASURES]
-        floors = self.floors(tolerance, length)[rows]
-        ratios = compute_error_ratios(tolerance, self.values[rows], self.errors[rows], floors)
-        return ratios.max(axis=0)
+        columns = (self.values[rows], self.errors[rows], self.floors[rows])
+        return compute_error_ratios(tolerance, *columns).max(axis=0)
+
+
+def compute_floors(values: "Arrays | Values", tolerance: float, length: float) -> np.ndarray:
+    """Return the absolute errors (k, n) of static measures that are allowed at any tolerance.
+
+    The floor of a measure that is a difference of larger terms is at least the tolerance times these terms
+    (`list_larger_terms`).
+
+    Parameters
+    ----------
+    values : dict
+        All k static measures by name; numbers or arrays (n,).
+    tolerance : float
+        Relative tolerance; 0 raises no floor.
+    length : float
+        Length [m] of the interface.
+    """
+    larger_terms = list_larger_terms(values, tolerance * length / 2)
+    floors = []
+    for name, value in values.items():
+        floor = np.maximum(PATCH_TABLE[name].floor, larger_terms.get(name, 0.0))
+        floors.append(floor + np.zeros(np.shape(value)))
+    return np.array(floors)
 
 
 def compute_error_ratios(tolerance: float, values, errors, floors) -> np.ndarray:
@@ -222,7 +226,8 @@ def estimate_static_measures(
     series : list of MeshValues
         The same cases on all meshes from coarse to fine, the last one that of `fine`.
     tolerance : float or None
-        Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
+        Relative tolerance of the floors. On an automatic mesh, values whose error exceeds it are extrapolated. None: nothing
+        is extrapolated, and no floor is raised.
     centre_error : float
         Error of the centre of a resolved contact [cell lengths]; by default that of a mesh for one contact.
 
@@ -232,6 +237,7 @@ def estimate_static_measures(
     """
     finest = series[-1].values
     names = tuple(finest)
+    model = fine.level.model
     n_meshes = _count_meshes_with_same_intervals(fine, series)
     missed_peak = unresolved_edge_rounding_pressure(fine)
     resolution = _compute_resolution(fine, missed_peak)
@@ -252,18 +258,20 @@ def estimate_static_measures(
         part = extrapolate_static_values(
             [mesh.take(rows).values for mesh in used],
             {name: error[rows] for name, error in hidden_errors.items()},
-            tolerance,
+            tolerance if model.mesh.is_automatic else None,
             max(MIN_REPORTED_RELATIVE_ERROR, fine.level.pair.round_off_error),
             factor[rows],
             nested=all(are_cells_halved(b.pair, a.pair) for a, b in pairwise(used)),
-            has_same_gap=fine.level.model.gap.profile is None,
+            has_same_gap=model.gap.profile is None,
         )
         values[:, rows] = part.values
         errors[:, rows] = part.errors
         is_limit[:, rows] = part.is_limit
 
-    estimates = StaticEstimates(names, values, errors, is_limit, _find_unbounded_pressure(fine))
-    if len(series) > 1 and fine.level.model.gap.profile is not None:
+    floors = compute_floors(dict(zip(names, values)), tolerance or 0.0, model.pieces.length)
+    reasons = _find_unbounded_pressure(fine)
+    estimates = StaticEstimates(names, values, errors, is_limit, reasons, floors)
+    if len(series) > 1 and model.gap.profile is not None:
         _widen_errors_by_end_pressure(estimates, *series[-2:])
     for mask in estimates.reasons.values():
         for name in PRESSURE_PEAK_MEASURES:
@@ -280,7 +288,7 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> Patch
     patches : sequence of Patch or None
         One patch on meshes from fine to coarse; None where there is no such mesh.
     tolerance : float or None
-        Measures that miss it are extrapolated if the mesh is automatic (`PatchMesh`). None: no floor is raised.
+        Relative tolerance (`estimate_static_measures`).
     points : PointSolution, optional
         Solution on the points of a profile, added to the finest patch.
 
@@ -294,7 +302,7 @@ def with_static_measures(patches, tolerance: float | None, points=None) -> Patch
     estimates = estimate_static_measures(
         fine.pressed,
         [collect_mesh_values(pressed) for pressed in reversed(meshes)],
-        tolerance if fine.model.mesh.is_automatic else None,
+        tolerance,
     )
     return add_measures(fine, estimates, tolerance, points), *coarse
 
@@ -316,16 +324,15 @@ def add_measures(
         Solution on the points of a profile, added to the patch.
     """
     measures = estimates.make_measures(0)
+    floors = estimates.floors[:, 0]
     if points is not None:
         patch = replace(patch, points=points, averaging=points.spacing)
         measures |= _select_more_accurate_measures(measures, points.measures)
-
-    # The floors follow from the values of the points, if these are more accurate
-    chosen = [[np.nan if one.value is None else one.value] for one in measures.values()]
-    floors = estimates._replace(values=np.array(chosen)).floors(
-        tolerance or 0.0, patch.model.pieces.length
-    )
-    for (name, measure), floor in zip(measures.items(), floors[:, 0]):
+        # The floors follow from the values of the points, if these are more accurate
+        values = dict.fromkeys(measures, np.nan)
+        known = {name: one.value for name, one in measures.items() if one.value is not None}
+        floors = compute_floors(values | known, tolerance or 0.0, patch.model.pieces.length)
+    for (name, measure), floor in zip(measures.items(), floors):
         measures[name] = replace(measure, floor=float(floor))
     return replace(patch, measures=measures)
 

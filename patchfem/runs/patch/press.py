@@ -16,7 +16,6 @@ from ...contact import edges
 from ...contact.press import SmoothLayer, press, press_patch
 from ...contact.set_table import SetTable
 from ...core import Compliance, ContactState, Outcome, PatchfemError, frozen_array
-from ...elasticity.lapack import use_one_blas_thread
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchModel
 from ..results.patch_rows import Arrays, Measures, Values
@@ -500,17 +499,18 @@ def press_on_level(
     errors : dict
         Error of each case that cannot be pressed, by its number.
     """
-    with use_one_blas_thread():
-        pressed, errors = _press_gaps(level, cases, start)
-        # A step between two nodes, as on a mesh that the scene prescribes, has no variants
-        variants = []
-        has_step_node = cases.step_changes is not None and level.gap.shapes[-1].any()
-        for side, moved in cases.variants if has_step_node else ():
-            node = int(np.argmax(level.gap.shapes[-1]))
-            part, more_errors = _press_gaps(level, moved, pressed.active)
-            errors = more_errors | errors
-            shift = compute_step_weight_shift(pressed, node)
-            variants.append((0.5 - side * shift, part))
+    pressed, errors = _press_gaps(level, cases, start)
+    # A step between two nodes, as on a mesh that the scene prescribes, has no variants
+    has_step_node = cases.step_changes is not None and level.gap.shapes[-1].any()
+    if not has_step_node:
+        return pressed, errors
+    variants = []
+    node = int(np.argmax(level.gap.shapes[-1]))
+    shift = compute_step_weight_shift(pressed, node)
+    for side, moved in cases.variants:
+        part, more_errors = _press_gaps(level, moved, pressed.active)
+        errors = more_errors | errors
+        variants.append((0.5 - side * shift, part))
     return replace(pressed, variants=tuple(variants)), errors
 
 
