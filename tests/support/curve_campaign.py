@@ -4,9 +4,10 @@
 
 Recipe: rig k of N_RIGS has the seed FIRST_SEED + k, a chain of 1 to 3 masses, and an interface to the ground at each of its
 1 to 3 last masses, with the laws in turn. Each sixth rig has a cubic spring, whose curve may have folds. The amplitude at
-the stated frequency of the peak is compared with that of the brute-force motion from rest or, where several motions coexist,
-of the nearest from other starts; its own uncertainty is added to the error. A multiplier is compared with the decay of the difference of two brute-force motions, on which MULTIPLIER_TOL is
-allowed, because they have steps of order 1. A sweep's peak without a curve agrees with that of the run that draws it.
+the stated frequency of the peak is compared with that of the brute-force motion from rest or, where several motions
+coexist, of the nearest from other starts; its own uncertainty is added to the error. A multiplier is compared with the
+decay of the difference of two brute-force motions, on which MULTIPLIER_TOL is allowed, because they have steps of order 1.
+A sweep's peak without a curve agrees with that of the run that draws it.
 """
 
 import json
