@@ -77,7 +77,7 @@ def make_sweep(seed: int) -> str:
     text, omega, acceleration = make_structure(seed)
     frequency = omega / (2 * np.pi)
     return (
-        f'{text}[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "{acceleration:.6g} m/s^2"\n'
+        f'{text}[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "{acceleration:.12g} m/s^2"\n'
         f'from = "{0.7 * frequency:.6g} Hz"\nto = "{1.9 * frequency:.6g} Hz"\nrate = "1 Hz/s"\n'
         '[accuracy]\nmethod = "harmonic"\ntolerance = 1e-2\n'
     )
