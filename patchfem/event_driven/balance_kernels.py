@@ -27,126 +27,144 @@ def balance_curve(balance):
     """
     n_omega = balance.slides.shape[0]
     for step in (1, -1):
-        for place in range(n_omega):
-            k = place if step > 0 else n_omega - 1 - place
+        for count in range(n_omega):
+            k = count if step > 0 else n_omega - 1 - count
             before = k - step
             if 0 <= before < n_omega and balance.is_balanced[before] > 0:
                 search(balance, k, balance.slides[before])
             search(balance, k, balance.slides[k])
             search(balance, k, balance.driven[k])
+
+    # The friction of all motions, from which those of the modes follow
     for k in range(n_omega):
         find_friction(balance, k, balance.slides[k])
 
 
 @njit(**NJIT_KERNEL)
-def search(balance, k, start):
+def search(balance, place, start):
     """Balance the motion at a frequency, unless it is balanced; a step that does not reduce the residual is halved.
 
     Parameters
     ----------
     balance : Balance
         Arrays of the rig and the motions.
-    k : int
+    place : int
         Number of the frequency.
     start : (n,) array
         Slides from which the search begins.
     """
-    if balance.is_balanced[k] > 0:
+    if balance.is_balanced[place] > 0:
         return
-    trial, best, step = balance.work[0], balance.work[1], balance.work[2]
+    trial = balance.work.motions[0]
+    best = balance.work.motions[1]
+    step = balance.work.motions[2]
     n = trial.size
     copy_values(start, trial)
     least = np.inf
     for _ in range(MAX_EVALUATIONS):
-        norm = evaluate(balance, k, trial)
+        norm = evaluate(balance, place, trial)
         is_better = norm < least
         largest = change = 0.0
+
+        # Newton step from the best motion, or half of the last one
         if is_better:
             least = norm
             copy_values(trial, best)
-            solve(balance.matrix, step)
+            solve(balance.work.matrix, step)
         for a in range(n):
             if not is_better:
                 step[a] *= 0.5
             trial[a] = best[a] + step[a]
             largest = max(largest, abs(trial[a]))
             change = max(change, abs(step[a]))
+
+        # A halved step is small, but no sign of convergence.
         if is_better and change <= TOLERANCE * largest:
-            copy_values(trial, balance.slides[k])
-            balance.is_balanced[k] = 1.0
+            copy_values(trial, balance.slides[place])
+            balance.is_balanced[place] = 1.0
             return
 
 
 @njit(**NJIT_KERNEL)
-def evaluate(balance, k, slides):
-    """Write the equations of a Newton step, U + G F(U) = d, into `balance.matrix`; return the largest residual.
+def evaluate(balance, place, slides):
+    """Write the equations of a Newton step, U + G F(U) = d, into `balance.work.matrix`; return the largest residual.
 
     Parameters
     ----------
     balance : Balance
         Arrays of the rig and the motions.
-    k : int
+    place : int
         Number of the frequency.
     slides : (n,) array
         Unknowns U.
     """
-    matrix = balance.matrix
-    receptance = balance.receptance[k]
+    matrix = balance.work.matrix
+    slopes = balance.work.slopes
+    receptance = balance.receptance[place]
     n = slides.size
-    n_waves = balance.waves.shape[1]
-    find_friction(balance, k, slides)
+    n_waves = balance.laws.waves.shape[1]
+    find_friction(balance, place, slides)
+
+    # Residual and Jacobian of each unknown
     norm = 0.0
     for a in range(n):
-        residual = balance.driven[k, a] - slides[a]
+        residual = balance.driven[place, a] - slides[a]
         for b in range(n):
-            residual -= receptance[a, b] * balance.forces[k, b]
+            residual -= receptance[a, b] * balance.forces[place, b]
             # The force of an interface depends on its own slide alone.
             face = b // n_waves
             slope = 1.0 if a == b else 0.0
             for c in range(n_waves):
-                slope += receptance[a, face * n_waves + c] * balance.slopes[c, b]
+                slope += receptance[a, face * n_waves + c] * slopes[c, b]
             matrix[a, b] = slope
+
         matrix[a, n] = residual
         norm = max(norm, abs(residual))
     return norm
 
 
 @njit(**NJIT_KERNEL)
-def find_friction(balance, k, slides):
-    """Write the harmonics of the friction into a row of `balance.forces`, and their derivatives by the slides into `slopes`.
+def find_friction(balance, place, slides):
+    """Write the harmonics of the friction into `forces`, and their derivatives by the slides into `slopes`.
 
     Parameters
     ----------
     balance : Balance
         Arrays of the rig and the motions.
-    k : int
+    place : int
         Number of the frequency.
     slides : (n,) array
         Harmonics of the slides.
     """
-    waves, path, friction, follows = balance.waves, balance.path, balance.friction, balance.follows
+    waves = balance.laws.waves
+    first_element = balance.laws.first
+    path = balance.work.path
+    friction = balance.work.friction
+    follows = balance.work.follows
+    slopes = balance.work.slopes
     n_samples, n_waves = waves.shape
-    forces = balance.forces[k]
-    for face in range(balance.elements.size - 1):
+    forces = balance.forces[place]
+    for face in range(first_element.size - 1):
+        # Slide at the samples, and friction of all elements there
         first = face * n_waves
         for s in range(n_samples):
             path[s] = friction[s] = 0.0
             for a in range(n_waves):
                 path[s] += waves[s, a] * slides[first + a]
                 follows[s, a] = 0.0
-        for e in range(balance.elements[face], balance.elements[face + 1]):
-            follow_element(balance, balance.lengths[e], balance.stiffness[e])
+        for e in range(first_element[face], first_element[face + 1]):
+            follow_element(balance, balance.laws.lengths[e], balance.laws.stiffness[e])
 
         # The sines and cosines of odd harmonics are orthogonal over half a period.
         for a in range(n_waves):
             forces[first + a] = 0.0
             for b in range(n_waves):
-                balance.slopes[a, first + b] = 0.0
+                slopes[a, first + b] = 0.0
             for s in range(n_samples):
                 factor = 2 / n_samples * waves[s, a]
                 forces[first + a] += factor * friction[s]
                 for b in range(n_waves):
-                    balance.slopes[a, first + b] += factor * follows[s, b]
+                    slopes[a, first + b] += factor * follows[s, b]
 
 
 @njit(**NJIT_KERNEL)
@@ -165,12 +183,15 @@ def follow_element(balance, length, stiffness):
     stiffness : float
         Stiffness of the element [N/m].
     """
-    waves, path = balance.waves, balance.path
+    waves = balance.laws.waves
+    path = balance.work.path
     n_samples, n_waves = waves.shape
     slide = path[0]
     stretch = min(max(slide, -length), length)
     last = 0 if stretch != slide else -1
     last_sign = 1.0
+
+    # The first half period leaves the stretch of a periodic motion.
     for k in range(1, 2 * n_samples):
         sign = 1.0 if k < n_samples else -1.0
         s = k % n_samples
@@ -182,13 +203,15 @@ def follow_element(balance, length, stiffness):
             last_sign = sign
         if k < n_samples:
             continue
-        balance.friction[s] -= stiffness * stretch
+
+        # The second half has the opposite sign.
+        balance.work.friction[s] -= stiffness * stretch
         if stretch == moved:
             for a in range(n_waves):
                 follow = waves[s, a]
                 if last >= 0:
                     follow += last_sign * waves[last, a]
-                balance.follows[s, a] += stiffness * follow
+                balance.work.follows[s, a] += stiffness * follow
 
 
 @njit(**NJIT_KERNEL)
@@ -208,12 +231,18 @@ def solve(matrix, solution):
         for r in range(k + 1, n):
             if abs(matrix[r, k]) > abs(matrix[pivot, k]):
                 pivot = r
+
+        # Exchange of rows, and elimination below the pivot
         for c in range(k, n + 1):
-            matrix[k, c], matrix[pivot, c] = matrix[pivot, c], matrix[k, c]
+            value = matrix[k, c]
+            matrix[k, c] = matrix[pivot, c]
+            matrix[pivot, c] = value
         for r in range(k + 1, n):
             factor = matrix[r, k] / matrix[k, k]
             for c in range(k, n + 1):
                 matrix[r, c] -= factor * matrix[k, c]
+
+    # Back substitution
     for k in range(n - 1, -1, -1):
         solution[k] = matrix[k, n]
         for c in range(k + 1, n):

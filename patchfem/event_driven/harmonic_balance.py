@@ -14,7 +14,7 @@ from ..core import ModalBasis
 from ..structure.response import compute_receptance
 from .cases import Case, Load, make_arrays
 from .laws import LAWS, masing
-from .records import Balance, Face, LawNumbers, Memory, Setting, State
+from .records import Balance, BalancedLaws, BalanceWork, Face, LawNumbers, Memory, Setting, State
 
 N_SMOOTH_ELEMENTS = 12  # elements in place of a smooth curve of first loading
 HARMONICS = np.array([1, 3, 5, 7, 9])  # harmonics that are balanced
@@ -49,6 +49,8 @@ class BalancedMotions(NamedTuple):
         state.y[n : 2 * n] = case.rig.settings[Setting.OMEGA] * (modes.real @ HARMONICS)
         samples = _sample(self.slides[0])
         speeds = self.slides[0].real @ HARMONICS
+
+        # Both reversals of each interface
         for face, memory, slide, speed in zip(case.rig.faces, state.memory, samples, speeds):
             if LAWS[int(face[Face.LAW])] != "masing":
                 continue
@@ -122,6 +124,8 @@ class HarmonicBalance:
         rig = _make_linear_rig(self.modes, omega, self.acceleration)
         largest = np.abs(rig.driven @ rig.rows.T).max(axis=0)
         self.laws = [_soften(*joint, size) for joint, size in zip(self.joints, largest)]
+
+        # U = (I + G K)^-1 d with the receptance G and the stiffness K of the interfaces and the slides d without friction
         slides = np.zeros((omega.size, len(self.laws), HARMONICS.size), complex)
         stiffness = np.diag([law.stiffness for law in self.laws])
         matrix = np.eye(len(self.laws)) + rig.rows @ rig.receptance[:, 0] @ stiffness
@@ -143,24 +147,32 @@ class HarmonicBalance:
         counts = [own.size for own in lengths]
         driven = np.zeros(slides.shape, complex)
         driven[:, :, 0] = rig.driven @ rig.rows.T
+
+        # Arrays of the compiled search
         n_samples, n_waves = WAVES.shape
         size = n_waves * len(self.laws)
-        balance = Balance(
-            receptance=_split_matrix(rig.rows @ rig.receptance),
-            driven=_split(driven),
-            waves=WAVES,
-            elements=np.append(0, np.cumsum(counts)),
-            lengths=np.concatenate(lengths),
-            stiffness=np.concatenate(stiffness),
-            slides=_split(slides),
-            is_balanced=np.zeros(omega.size),
+        laws = BalancedLaws(
+            WAVES,
+            np.append(0, np.cumsum(counts)),
+            np.concatenate(lengths),
+            np.concatenate(stiffness),
+        )
+        work = BalanceWork(
             path=np.zeros(n_samples),
             friction=np.zeros(n_samples),
             follows=np.zeros((n_samples, n_waves)),
-            forces=np.zeros((omega.size, size)),
             slopes=np.zeros((n_waves, size)),
             matrix=np.zeros((size, size + 1)),
-            work=np.zeros((3, size)),
+            motions=np.zeros((3, size)),
+        )
+        balance = Balance(
+            receptance=_separate_matrix(rig.rows @ rig.receptance),
+            driven=_separate(driven),
+            slides=_separate(slides),
+            forces=np.zeros((omega.size, size)),
+            is_balanced=np.zeros(omega.size),
+            laws=laws,
+            work=work,
         )
         kernel_cache.load_compiled_module("event_driven.balance_kernels").balance_curve(balance)
 
@@ -170,19 +182,19 @@ class HarmonicBalance:
         return BalancedMotions(omega, motion, _join(balance.slides), heights)
 
 
-def _split(harmonics) -> np.ndarray:
+def _separate(harmonics) -> np.ndarray:
     """Return the real and the imaginary parts (k, i 2 h) of the harmonics (k, i, h) of each interface in a row."""
     parts = np.concatenate([harmonics.real, harmonics.imag], axis=2)
     return parts.reshape(len(harmonics), -1)
 
 
 def _join(parts) -> np.ndarray:
-    """Return the harmonics (k, i, h) of the real and the imaginary parts (k, i 2 h) of `_split`."""
+    """Return the harmonics (k, i, h) of the real and the imaginary parts (k, i 2 h) of `_separate`."""
     real, imaginary = np.moveaxis(parts.reshape(len(parts), -1, 2, HARMONICS.size), 2, 0)
     return real + 1j * imaginary
 
 
-def _split_matrix(receptance) -> np.ndarray:
+def _separate_matrix(receptance) -> np.ndarray:
     """Return the real matrices (k, i 2 h, i 2 h) that multiply parts as receptances (k, h, i, i) multiply harmonics."""
     n_omega, n_harmonics, n_faces = receptance.shape[:3]
     matrix = np.zeros((n_omega, n_faces, 2, n_harmonics, n_faces, 2, n_harmonics))

@@ -450,6 +450,38 @@ class LawNumbers(NamedTuple):
     stiffness: float = 0.0
 
 
+class BalancedLaws(NamedTuple):
+    """Elements of all interfaces in a row, and the waves in which their slides and forces are expressed.
+
+    - waves: (s, w) the w sines and cosines at the samples of half a period
+    - first: (i + 1,) first element of each interface, and their number
+    - lengths, stiffness: (e,) largest stretch [m] and stiffness [N/m] of the elements
+    """
+
+    waves: np.ndarray
+    first: np.ndarray
+    lengths: np.ndarray
+    stiffness: np.ndarray
+
+
+class BalanceWork(NamedTuple):
+    """Arrays of the search for a balance.
+
+    - path, friction: (s,) slide [m] and friction [N] of an interface at the samples
+    - follows: (s, w) derivatives of the friction by the waves of the slide [N/m]
+    - slopes: (w, n) derivatives of the waves of the friction of each interface by those of its own slide [N/m]
+    - matrix: (n, n + 1) equations of a Newton step
+    - motions: (3, n) trial, best motion and step [m]
+    """
+
+    path: np.ndarray
+    friction: np.ndarray
+    follows: np.ndarray
+    slopes: np.ndarray
+    matrix: np.ndarray
+    motions: np.ndarray
+
+
 class Balance(NamedTuple):
     """Balance of odd harmonics at k frequencies.
 
@@ -457,31 +489,16 @@ class Balance(NamedTuple):
 
     - receptance: (k, n, n) slides per friction force, with the factors of sines and cosines
     - driven: (k, n) slides without friction [m]
-    - waves: (s, w) the w sines and cosines at the samples of half a period
-    - elements: (i + 1,) first element of each interface, and their number
-    - lengths, stiffness: (e,) largest stretch [m] and stiffness [N/m] of the elements
     - slides: (k, n) motions at which the search begins, then those that are balanced [m]
-    - is_balanced: (k,) 1.0 where a motion is balanced, else 0.0
-    - path, friction: (s,) slide [m] and friction [N] of an interface at the samples
-    - follows: (s, w) derivatives of the friction by the slide [N/m]
     - forces: (k, n) friction of the motions [N]
-    - slopes: (w, n) derivatives of the friction of each interface by its own slide [N/m]
-    - matrix: (n, n + 1) equations of a Newton step
-    - work: (3, n) trial, best motion and step of a search [m]
+    - is_balanced: (k,) 1.0 where a motion is balanced, else 0.0
+    - laws, work: elements of the interfaces, and arrays of the search
     """
 
     receptance: np.ndarray
     driven: np.ndarray
-    waves: np.ndarray
-    elements: np.ndarray
-    lengths: np.ndarray
-    stiffness: np.ndarray
     slides: np.ndarray
-    is_balanced: np.ndarray
-    path: np.ndarray
-    friction: np.ndarray
-    follows: np.ndarray
     forces: np.ndarray
-    slopes: np.ndarray
-    matrix: np.ndarray
-    work: np.ndarray
+    is_balanced: np.ndarray
+    laws: BalancedLaws
+    work: BalanceWork

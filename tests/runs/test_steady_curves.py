@@ -209,7 +209,7 @@ def test_exact_curve_of_iwan_law_with_five_modes_agrees_with_march():
 
 
 def test_exact_case_whose_maxima_share_points_has_peak_of_run():
-    """A flat first-harmonic balance has several maxima; the peak of a sweep's case is that of the drawn curve."""
+    """A flat balance has several maxima; the peak of a sweep's case is that of the drawn curve."""
     scene = pf.new("shroud")
     joint = {"structure.mode.flap.slide": 0.2598, "drive.force": "2 N"}
     run = pf.run(scene, **joint)
