@@ -238,7 +238,7 @@ RUNS = [
 
 
 @pytest.mark.parametrize("text, changes, outcome, sentence, absent", RUNS)
-def test_exact_outcome_and_sentences(text, changes, outcome, sentence, absent):
+def test_outcome_and_sentences(text, changes, outcome, sentence, absent):
     """A run has its outcome and its sentence. A run that changes until its end has no steady amplitude."""
     result = run_scene(
         text,
