@@ -115,9 +115,10 @@ def make_channels(
 
 
 def find_unit_factors(path, datasets: list[Dataset]) -> Dataset | None:
-    """Return dataset 164 of a file, whose `length` and `force` are its units per SI unit, or None without it.
+    """Return dataset 164 of a file, which has the unit factors of its numbers, or None without it.
 
-    `path` names the file in the message.
+    Its entry `length` is the number of units of length in a metre, and `force` that of units of force in a newton.
+    PatchfemError is raised if one of them is not above 0; `path` names the file in the message.
     """
     factors = next((dataset for dataset in datasets if dataset["type"] == 164), None)
     if factors is not None and not min(factors["length"], factors["force"]) > 0:

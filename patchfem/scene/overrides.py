@@ -223,10 +223,10 @@ def replace_number(
 
 
 def _is_plain(draft: SceneDraft, scene: Scene) -> bool:
-    """Return whether a scene is simple enough for PLAIN_KEYS, the numbers that no check depends on below their limits.
+    """Return whether the numbers in PLAIN_KEYS may change in a scene, inside their intervals, without a new check.
 
-    It must be of a kind in PLAIN_SCENES, and name no files except one of measured responses. `draft` has the values as
-    they were written.
+    This is true for the scenes that a row of PLAIN_SCENES describes and that name no files except one of measured
+    responses. `draft` has the values of the scene as they were written.
     """
     names = [key for key, _ in list_named_files(scene)]
     is_pressed = scene.kind == "patch" and all(key.startswith("contact.") for key in names)

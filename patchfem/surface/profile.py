@@ -81,11 +81,23 @@ def resample_evenly(profile: Profile) -> Profile:
 
 
 def _bridge(profile: Profile, usable, max_gap: float = np.inf) -> Profile:
-    """Replace all but the usable heights of a profile by straight lines, and cut off such ends.
+    """Replace the heights of a profile that are not usable by straight lines between those that are.
 
-    Raises PatchfemError for fewer than two usable heights, and if a line is longer than `max_gap` [m].
+    The profile then reaches from the first to the last usable height. If it has missing heights, a note counts them.
 
-    `usable` (n,) is a mask. A note of the returned profile counts the missing heights.
+    Parameters
+    ----------
+    profile : Profile
+        Profile with n heights.
+    usable : (n,) array of bool
+        Whether a height is kept.
+    max_gap : float
+        Longest line [m].
+
+    Raises
+    ------
+    PatchfemError
+        If there are fewer than two usable heights, or if a line would be longer than `max_gap`.
     """
     places = profile.x[usable]
     if places.size < 2:

@@ -167,7 +167,7 @@ def test_exact_order_towards_a_better_value_bears_a_change_of_sign():
     assert found.order == pytest.approx(1.7, rel=1e-8)
 
 
-def test_exact_sufficient_setting_is_extrapolated_from_stated_errors():
+def test_sufficient_setting_is_extrapolated_from_stated_errors():
     """Errors 3.3 n^-p are within 1e-4 of 2 from n = (3.3/2e-4)^(1/p) on, where CPU seconds are n/100."""
     runs = make_series(1.7)
     far = extrapolate_sufficient_run(runs, "steps_per_cycle", "loop_area", 1e-4)

@@ -176,7 +176,7 @@ def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatc
         read_curve(table)
 
 
-def test_exact_damping_in_percent_and_assumed_errors(tmp_path):
+def test_damping_in_percent_and_assumed_errors(tmp_path):
     """Damping in percent is read as the ratio, and errors that a table does not give are assumed until a fit."""
     rows = ((1, 100, 0.2, 0.5), (2, 99, 0.3, 0.5))
     path = tmp_path / "curve.csv"

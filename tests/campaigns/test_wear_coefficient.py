@@ -31,9 +31,7 @@ def scene(tmp_path, monkeypatch):
     "name, source, area",
     [("worn_depth_max", "worn_depth_max", 1), ("worn_depth_mean", "worn_volume", 12.7e-3**2)],
 )
-def test_exact_wear_coefficient_is_recovered_from_computed_depth(
-    scene, tmp_path, name, source, area
-):
+def test_wear_coefficient_is_recovered_from_computed_depth(scene, tmp_path, name, source, area):
     """The wear coefficient is recovered from the computed worn depth within 1e-3."""
     measures = pf.run(load(WORN)).measures
     measure = measures[source]
@@ -58,7 +56,7 @@ def test_exact_wear_coefficient_is_recovered_from_computed_depth(
     )
 
 
-def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path):
+def test_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path):
     """The interval of the coefficient has the relative ends of the interval of the depth.
 
     The worn volume is proportional to the coefficient.

@@ -67,7 +67,7 @@ def test_exact_imported_table_is_read_by_all_readers(tmp_path):
     assert read_loop(out).reading == pytest.approx(4.4482216152605 * (time + 1), rel=1e-12)
 
 
-def test_exact_imported_modes_agree_with_driven_oscillators(measured_file, tmp_path):
+def test_imported_modes_agree_with_driven_oscillators(measured_file, tmp_path):
     """The modes of a record agree with those of the simulated oscillators.
 
     Frequencies agree within 1e-8, damping ratios and residues within 1e-6.

@@ -119,7 +119,7 @@ def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp
     assert "Computed and measured wear" in page
 
 
-def test_exact_wear_coefficient_follows_run_history(crowned_run, tmp_path):
+def test_wear_coefficient_follows_run_history(crowned_run, tmp_path):
     """The coefficient for a wear state inside the history of the run agrees within 2e-3.
 
     The depth is not proportional to the coefficient there.

@@ -38,7 +38,7 @@ def scan_file(tmp_path) -> Path:
     return path
 
 
-def test_exact_profile_json_is_in_si_units(trace_file, scan_file):
+def test_profile_json_is_in_si_units(trace_file, scan_file):
     """The JSON gives parameters in SI units; Sq of a scan agrees with the rms about a least-squares plane within 1e-9."""
     answer = run_cli("profile", trace_file, scan_file, "--json").content
     first, second = answer["profiles"]
@@ -103,7 +103,7 @@ def split_scene(tmp_path, monkeypatch) -> Path:
     return tmp_path / "scene.toml"
 
 
-def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
+def test_a_trace_of_two_waves_is_split_between_them(split_scene):
     """Truth: 0.45 times the rms height beyond the Gaussian filter; the pressure that closes a sine of this slope."""
     words = ("profile", "waves.csv", "--split", split_scene, "--cutoff", "250 um", "--json")
     split = run_cli(*words).content["split"]

@@ -69,7 +69,7 @@ def compute_stiffnesses(block, active):
         pytest.param(Block(8e-3, 16e-3, COATED), 5, 8e-4, marks=pytest.mark.slow),
     ],
 )
-def test_exact_flat_block_agrees_with_hexahedra(block, count, tolerance):
+def test_flat_block_agrees_with_hexahedra(block, count, tolerance):
     """Hexahedra are stiffer than flat blocks by less than their error, and two levels differ by 1e-3 at most."""
     shape = BlockShape(block.length, block.width)
     active = np.ones((32, 32), bool)
@@ -84,7 +84,7 @@ def test_exact_flat_block_agrees_with_hexahedra(block, count, tolerance):
 
 
 @pytest.mark.parametrize("count", [3, pytest.param(5, marks=pytest.mark.slow)])
-def test_exact_roll_agrees_with_hexahedra(count):
+def test_roll_agrees_with_hexahedra(count):
     """The stiffnesses of the strip that touches under a roll of .1 mrad agree with elements within 8e-3.
 
     Both kinds of stiffness converge slowly at the edge of the strip, from either side.
@@ -259,7 +259,7 @@ def get_elements():
     return make_cell_elements(*get_slipping_cells())
 
 
-def test_exact_first_loading_is_concave_and_ends_at_the_limit():
+def test_first_loading_is_concave_and_ends_at_the_limit():
     """9: The curve begins with the stiffness of the set, is concave, and ends at the friction limit."""
     shear, limit = get_slipping_cells()
     elements = get_elements()
@@ -272,7 +272,7 @@ def test_exact_first_loading_is_concave_and_ends_at_the_limit():
 
 
 @pytest.mark.parametrize("fraction", [0.1, 0.25, 0.6, 0.9])
-def test_exact_loops_between_levels_have_the_slip_work(fraction):
+def test_loops_between_levels_have_the_slip_work(fraction):
     """Force and loop of the elements between the levels are those of a bounded problem, to 1e-4 and 2e-3."""
     shear, limit = get_slipping_cells()
     elements = get_elements()
@@ -287,7 +287,7 @@ def test_exact_loops_between_levels_have_the_slip_work(fraction):
     assert found == pytest.approx(force, rel=1e-4)
 
 
-def test_exact_masing_loop_agrees_with_stepped_cycle(n_steps=12):
+def test_masing_loop_agrees_with_stepped_cycle(n_steps=12):
     """10: The loop area by elements is that of a cycle in steps, each from the slip before, within .1 %."""
     from patchfem.contact.bounded import BoundedProblem, solve_bounded
 
@@ -314,7 +314,7 @@ def test_exact_masing_loop_agrees_with_stepped_cycle(n_steps=12):
     assert 2 * dissipated == pytest.approx(loop, rel=1e-3)
 
 
-def test_exact_states_at_a_reversal():
+def test_states_at_a_reversal():
     """Slipping cells are at their limit and slip forward, sticking ones do not slip, and open ones carry nothing."""
     shear, limit = get_slipping_cells()
     elements = get_elements()
@@ -356,7 +356,7 @@ def test_exact_rigid_cells_on_a_spring_share_its_force():
     assert shear_modes(rigid, limit.ravel(), 4).stiffness.size == 1
 
 
-def test_exact_finer_bricks_keep_partial_slip():
+def test_finer_bricks_keep_partial_slip():
     """Bricks of the free sides two levels finer change the force at half of gross slip by 2e-4, the stiffness by 1e-3."""
     forces, stiffnesses = [], []
     for level in (1, 3):
@@ -370,7 +370,7 @@ def test_exact_finer_bricks_keep_partial_slip():
     assert stiffnesses[0] == pytest.approx(stiffnesses[1], rel=1e-3)
 
 
-def test_exact_small_sphere_on_blocks_has_the_local_stiffness_of_mindlin(radius=0.5):
+def test_small_sphere_on_blocks_has_the_local_stiffness_of_mindlin(radius=0.5):
     """Gross slip exceeds the friction limit over the stiffness by half of Mindlin's local displacement, within 1 %.
 
     The block adds a displacement in proportion to the force, which the difference leaves out.

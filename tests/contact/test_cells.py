@@ -156,7 +156,7 @@ def press_open(shape, size, gap, loading, stack=STEEL):
     return cells, press_cells(cells, gap(cells.x, cells.y[:, None]), loading, tolerance=1e-9)
 
 
-def test_exact_hertz_sphere(radius=0.01, n_cells=128):
+def test_hertz_sphere(radius=0.01, n_cells=128):
     """Peak, approach, area and stiffness of two spheres agree with Hertz on 128 x 128 cells."""
     half = (3 * LOAD * radius / 4 / MODULUS) ** (1 / 3)
     cells, pressed = press_open(
@@ -199,7 +199,7 @@ def test_exact_hertz_ellipse(radius=0.01, ratio=4.0, n_cells=128):
     assert pressed.approach == pytest.approx(approach, rel=3e-5)
 
 
-def test_exact_disc_with_two_free_tilts(radius=1e-3, n_cells=128):
+def test_disc_with_two_free_tilts(radius=1e-3, n_cells=128):
     """A flat disc under a load line off both axes has the approach and both tilts of the closed form within .5 %."""
     offset = radius / 5
     angle = np.radians(30)
@@ -313,7 +313,7 @@ def test_exact_sphere_on_coated_half_space(radius=0.1, n_cells=128):
 
 
 @pytest.mark.parametrize("poisson", [0.0, 0.3])
-def test_exact_cattaneo_mindlin(poisson, radius=0.01, friction=0.3, n_cells=128):
+def test_cattaneo_mindlin(poisson, radius=0.01, friction=0.3, n_cells=128):
     """First loading, elements and the stick zone of a sphere agree with Cattaneo and Mindlin."""
     stack = LayerStack((), (), lame_constants(210e9, poisson, "strain"))
     mu = stack.base[1]

@@ -155,7 +155,7 @@ def solve_hertz_block(per_half_width):
     return piece, force, u, compute_centre_stress(get_cells(piece), u)
 
 
-def test_exact_hertz_subsurface_stress_peaks():
+def test_hertz_subsurface_stress_peaks():
     """The recovered stress peaks as in Hertz: shear 0.300 p0 at 0.786 a, von Mises 0.558 p0 at 0.704 a."""
     depth = np.linspace(0.2, 2, 200001) * HALF_WIDTH
     axis = hertz_axis_stress(depth)

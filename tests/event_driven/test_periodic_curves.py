@@ -89,7 +89,7 @@ def test_continuation_ends_with_count_of_steps():
         shooting.relax(10)
 
 
-def test_exact_closed_curve_ends_after_one_turn():
+def test_closed_curve_ends_after_one_turn():
     """At 160 Hz the level of the motions has a maximum L over their amplitude. Under the level (0.99 + p^2) L their curve
     over p is closed: it is followed once, and turns back where the level is L, at p = 0.1 and at p = -0.1."""
     omega = 2 * np.pi * 160
@@ -120,7 +120,7 @@ def make_sine_case(omega: float) -> cases.Case:
 DUFFING = [LawNumbers("springs", (CUBIC, 0.0, 1.0))]
 
 
-def test_exact_folds_are_near_those_of_one_harmonic():
+def test_folds_are_near_those_of_one_harmonic():
     """The folds are the extremes of the frequency over the amplitude on the relation of one harmonic, level =
     a |W^2 - w^2 + 3 c a^2/(4 m) + 2 i xi W w|, within the 2 % by which higher harmonics move them. There a multiplier
     passes 1."""
@@ -210,7 +210,7 @@ def test_curve_passes_where_the_reversal_is_at_the_start_of_the_period():
 @pytest.mark.parametrize(
     "law", [IWAN, masing.from_elements([3.0, 4.0, 5.0], [0.05, 0.1, 0.02]), BONDS]
 )
-def test_exact_points_of_curve_agree_with_long_runs(law):
+def test_points_of_curve_agree_with_long_runs(law):
     """Points of the curve of a mass on a spring through its resonance have the amplitudes and losses of runs from rest of
     300 cycles, within 2e-3; the memory of the transient may shift the loop of a run. All points are stable."""
     modes = make_modes(zeta=0.02)
@@ -287,7 +287,7 @@ def test_exact_multipliers_of_many_elements_agree_with_perturbed_march():
 
 
 @pytest.mark.parametrize("speed", [0.1, 3e-3])
-def test_exact_product_of_multipliers_of_rate_law_is_its_damping(speed):
+def test_product_of_multipliers_of_rate_law_is_its_damping(speed):
     """Liouville's formula: the product of the multipliers is exp(-int (2 zeta + dF/dv) dt), within 1 %, also for a law
     whose force changes within a small part of the cycle."""
     modes = make_modes(zeta=0.05)

@@ -19,7 +19,7 @@ def get_verdict(scene, **sets) -> tuple:
     return runs.make_run_answer(result).verdict, result
 
 
-def test_exact_release_agrees_with_closed_form():
+def test_release_agrees_with_closed_form():
     """Position and time of rest of a Coulomb oscillator agree with the closed form within 0.5 %.
 
     Each half swing reduces the amplitude by 2 mu N/k, and the block stops where the spring force is
@@ -50,7 +50,7 @@ def test_exact_release_agrees_with_closed_form():
     assert float(match[2]) == pytest.approx(1e3 * (len(reversals) - 1) / (2 * 143), rel=5e-3)
 
 
-def test_exact_loss_factor_agrees_with_parallelogram():
+def test_loss_factor_agrees_with_parallelogram():
     """The loss factor of an elastic-plastic bench agrees with the closed form of its loop within its error.
 
     For a parallelogram of force mu N, stiffness k and slide A, the work is W = 4 mu N (A - mu N/k); the first harmonic of
@@ -102,7 +102,7 @@ def test_exact_measured_row_is_compared_with_reading_of_sensor(tmp_path):
     assert readings["rms"] == pytest.approx(1.5 * peak / np.sqrt(2), rel=1e-4)
 
 
-def test_exact_spectra_agree_with_transfer_function():
+def test_spectra_agree_with_transfer_function():
     """Under white noise of density G the displacement spectrum is G |H|^2 within 5 %, H = 1/(w0^2 - w^2 + 2 i zeta w0 w).
 
     Each of 126 lines scatters by 18 %, and their median by less. The window of the segments widens the peak, which is

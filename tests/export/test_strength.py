@@ -51,7 +51,7 @@ def find_yield_notes(tmp_path, peak: float) -> list:
     return [note for note in summary["notes"] if "yield strength" in note]
 
 
-def test_exact_yield_note_agrees_with_hertz(tmp_path):
+def test_yield_note_agrees_with_hertz(tmp_path):
     """The note on yielding appears where Hertz's stress reaches the yield strength.
 
     Its stress agrees within 2.5 %, and its depth within half a cell.

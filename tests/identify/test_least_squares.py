@@ -67,7 +67,7 @@ def test_exact_linear_fit_has_closed_form_intervals():
     )
 
 
-def test_exact_value_at_bound_has_profile_interval():
+def test_value_at_bound_has_profile_interval():
     """A value at its bound has the profile interval of the parabola of the sum of squares.
 
     An error of the model widens it by the shift of the minimum beyond the bound, so that it contains the interval of the
@@ -103,7 +103,7 @@ def test_exact_value_at_bound_has_profile_interval():
         assert changed.intervals.ends[1, 1] <= widened[1]
 
 
-def test_exact_nonlinear_value_has_transformed_interval():
+def test_nonlinear_value_has_transformed_interval():
     """The profile interval of v with w = v^3 is the cube root of the interval of w."""
     data = 1.0 + 1.5 * RNG.normal(size=12)
     half = student.ppf(0.975, 11) * data.std(ddof=1) / np.sqrt(12)

@@ -257,9 +257,10 @@ def mindlin_damping(amplitude, stuck: float, slide: float):
     return np.array(out)
 
 
-def test_always_release_errors_cover_mindlin_damping():
-    """The errors of the decay curve cover Mindlin's damping."""
-    decay = pf.run(CROWNED).motion.decay
+@pytest.mark.parametrize("tolerance", [1e-2, pytest.param(1e-3, marks=pytest.mark.slow)])
+def test_always_release_errors_cover_mindlin_damping(tolerance):
+    """The errors of the decay curve cover Mindlin's damping, with coarse and with fine meshes."""
+    decay = pf.run(CROWNED, **{"accuracy.tolerance": tolerance}).motion.decay
     stuck = decay.frequency[-1]
     known = np.flatnonzero(np.isfinite(decay.damping_error))[::20]
     law = mindlin_damping(decay.amplitude[known], stuck, 1.0)

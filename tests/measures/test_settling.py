@@ -113,7 +113,7 @@ tolerance = 0.01
 """
 
 
-def test_exact_beating_modes_are_transient():
+def test_beating_modes_are_transient():
     """Three modes that beat are transient, and the error of the steady amplitude covers the value after 2500 cycles.
 
     After 2500 cycles the slowest mode has exp(-27) of its free motion left.

@@ -34,7 +34,7 @@ def test_order_work_at_small_slides_is_cubic(amplitude):
     )
 
 
-def test_exact_work_at_large_slides_falls_with_range_width():
+def test_work_at_large_slides_falls_with_range_width():
     """At large slides an element that is spread over a range of width w dissipates k w^2/3 less per
     cycle."""
     range_width = np.array([4e-8, 5e-8, 4e-8, 2e-8])

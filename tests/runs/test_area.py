@@ -53,7 +53,7 @@ def rolled():
     return run_block(tilt(0, 0.1))
 
 
-def test_exact_pressure_of_roll_is_that_of_tilt_turned(rolled):
+def test_pressure_of_roll_is_that_of_tilt_turned(rolled):
     """A roll presses as a tilt does, turned by 90 degrees; shear has a direction, so that its stiffness differs."""
     tilted = run_block(tilt(0.1, 0))
     pressure = tilted.patch.pressed.pressure

@@ -104,7 +104,7 @@ def test_exact_sphere_on_springs(radius=0.5):
 
 
 @pytest.mark.parametrize("load", [LOAD, LOAD / 8])
-def test_exact_small_sphere_is_hertz(load, radius=0.5):
+def test_small_sphere_is_hertz(load, radius=0.5):
     """5, 6: The contact of a small sphere is that of half-spaces within 1 %; an eighth of the load halves its radius."""
     sphere = {"crown": {"radius": f"{radius} m", "across": f"{radius} m"}, "load": f"{load!r} N"}
     result = run(TITANIUM, sphere)
@@ -116,7 +116,7 @@ def test_exact_small_sphere_is_hertz(load, radius=0.5):
     assert result.measures["contact_area"].value == pytest.approx(np.pi * half**2, rel=0.01)
 
 
-def test_exact_wide_flat_block_is_plane_strain(ratio=16):
+def test_wide_flat_block_is_plane_strain(ratio=16):
     """7: The stiffnesses of a flat block 16 times as wide as tall are those of plane strain within 2 %."""
     wide = TITANIUM | {"width": f"{ratio * HEIGHT} m"}
     face = run(wide)
@@ -169,7 +169,7 @@ COATED = TITANIUM | {"coating": {"material": "WC-Co", "thickness": "6 mil"}}
     "shape", [{"crown": {"radius": "50 m"}}, {"tilt": {"angle": "0.1 mrad"}}], ids=["crown", "tilt"]
 )
 @pytest.mark.parametrize("n_cells", [200, 256])
-def test_exact_guided_face_is_the_plane_run(shape, n_cells):
+def test_guided_face_is_the_plane_run(shape, n_cells):
     """Between guides along y, a face agrees with the plane run within .1 %, wherever the edge lies between the cells."""
     plane = BLOCK | COATED | shape
     model = pf.build({"contact": plane}).patch

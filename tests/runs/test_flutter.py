@@ -97,7 +97,7 @@ WEAKENING_SCENE = {
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("ratio, grows", [(0.995, False), (1.005, True)])
-def test_exact_flutter_amplitude_of_weakening_law(ratio, grows):
+def test_flutter_amplitude_of_weakening_law(ratio, grows):
     """Under a velocity-weakening law, releases 0.5 % below the flutter amplitude decay, and those 0.5 % above it grow.
 
     Smaller motions end in a limit cycle of micro-slip. Den Hartog's balance with the kinetic coefficient alone gives

@@ -23,7 +23,7 @@ def groove_loop_area(mu, reach):
 
 
 @pytest.mark.parametrize("reach", [30e-6, 200e-6])
-def test_exact_slow_sliding_loop_agrees_with_closed_form(reach):
+def test_slow_sliding_loop_agrees_with_closed_form(reach):
     """Area and peak force of a slow friction loop over grooves agree with the closed form, and its energies balance."""
     result = pf.run(BENCH, **{"slide.amplitude": f"{reach} m"})
     assert result.measures["loop_area"].value == pytest.approx(

@@ -110,7 +110,7 @@ SHEARED_PIECES = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
         ),
     ],
 )
-def test_exact_wear_of_sheared_patch_agrees_with_friction_work(text, keys):
+def test_wear_of_sheared_patch_agrees_with_friction_work(text, keys):
     """The wear of all points adds up to kappa times the friction work (form 'energy'), or to this
     divided by mu (form 'archard'); half of the volume is taken from each piece."""
     for form, divisor in (("archard", MU), ("energy", 1.0)):

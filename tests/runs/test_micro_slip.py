@@ -78,7 +78,7 @@ def test_exact_static_measures_of_bench_without_zones_of_slip_are_those_of_stati
         assert bench[name].error == pytest.approx(measure.error, rel=1e-9), name
 
 
-def test_exact_stuck_flat_joint_has_no_loop_area():
+def test_stuck_flat_joint_has_no_loop_area():
     """Below the first yield of a flat joint nothing slips: the loop area is zero, and the mesh is
     not refined at a slip zone."""
     flat = re.sub(r"\[contact.crown\]\nradius.*\n", "", SLIDING_BENCH)

@@ -30,7 +30,7 @@ RESPONSE_MEASURES = (
 )
 
 
-def test_exact_random_response_agrees_with_scipy_lsim():
+def test_random_response_agrees_with_scipy_lsim():
     """The motion under a random record and its root mean square agree with SciPy's linear filter of
     this record, and its spectrum is consistent with both."""
     result = pf.run(RIG)

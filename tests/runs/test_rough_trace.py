@@ -54,7 +54,7 @@ def test_exact_peak_pressure_of_rough_trace_is_that_of_its_pressure_field(result
     assert 141e6 < peak.value - peak.error / 2 < peak.value
 
 
-def test_exact_loaded_fraction_is_mean_over_peak_pressure(result):
+def test_loaded_fraction_is_mean_over_peak_pressure(result):
     """The loaded fraction times the peak pressure is the mean pressure."""
     peak, fraction = (result.measures[name] for name in ("pressure_peak", "loaded_fraction"))
     mean = 7 / (10e-3 * 1e-3 * LENGTH)

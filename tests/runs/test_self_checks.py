@@ -27,7 +27,7 @@ SLIDE = '[slide]\nkind = "sine"\namplitude = "60 um"\nfrequency = "50 Hz"\ncycle
         (POINT + PLASTIC + RIG, "accuracy.method=harmonic"),
     ],
 )
-def test_exact_motion_satisfies_equation_of_motion_of_scene(text, changes):
+def test_motion_satisfies_equation_of_motion_of_scene(text, changes):
     """The last cycles satisfy z'' = -2 zeta omega z' - omega^2 z - base a - slide F/m with the numbers of the scene.
 
     The amplitude and the loop area are those of the sums over the modes, and the peak that of the acceleration.

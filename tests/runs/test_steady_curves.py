@@ -133,7 +133,7 @@ def test_exact_regimes_of_laws_with_memory():
     assert pf.run(spring, **STEADY).motion.steady.regime == "no friction"
 
 
-def test_exact_measures_of_bonds_agree_with_march():
+def test_measures_of_bonds_agree_with_march():
     """The measures under bonds agree within 2e-3 with those of a scene that is integrated in time for 300 cycles at 5 g."""
     scene = POINT + NONLOCAL.replace("1 um", "20 um") + MODE + SINE.format(143, 300)
     keys = {"accuracy.method": "march", "accuracy.steps_per_cycle": 1000}

@@ -37,7 +37,7 @@ def test_exact_uniform_load_has_uniform_stress():
     np.testing.assert_allclose(pieces.lower.displacement[-1, face, 1], -shortening, 1e-9)
 
 
-def test_exact_stress_on_a_coarser_mesh():
+def test_stress_on_a_coarser_mesh():
     """On a mesh with half the columns the resultants of the forces stay, and the peak stress changes by its error."""
     tilted = (
         UNIFORM.replace('element_size = "100 um"\n', "") + '[contact.tilt]\nangle = "0.2 mrad"\n'

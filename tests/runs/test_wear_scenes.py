@@ -84,7 +84,7 @@ def test_static_measures_after_wear_are_those_of_the_worn_patch():
 
 
 @pytest.mark.parametrize("motion", [SINE, STRUCTURE], ids=["bench", "rig"])
-def test_exact_point_contact_wear_agrees_with_archard(motion):
+def test_point_contact_wear_agrees_with_archard(motion):
     """The worn volume of a point contact is kappa N 4 A n, on a bench and in a rig."""
     result = pf.run(POINT + COULOMB + motion + WEAR)
     amplitude = result.measures["slip_amplitude"].value

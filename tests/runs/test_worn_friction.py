@@ -93,7 +93,7 @@ def test_always_wear_steps_resolve_rows_of_friction_table():
     ]
 
 
-def test_exact_bond_length_follows_worn_depth():
+def test_bond_length_follows_worn_depth():
     """The bond length follows the table over the worn depth, and the loop area is that of this bond length."""
     result = run_scene(
         "wear.form=archard",

@@ -45,7 +45,7 @@ def test_exact_bands_of_a_rolled_face_carry_their_part_of_the_load():
     assert shear == pytest.approx(moment, abs=1e-6 * limits.sum())
 
 
-def test_exact_bands_of_a_face_wear_by_their_own_slip():
+def test_bands_of_a_face_wear_by_their_own_slip():
     """The worn volume of each band follows from its load and its own slip amplitude."""
     wear = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1e3\njumps = 1\n[accuracy]\ntolerance = 1e-2\n'
     mode = MODE + 'yaw = "20 rad/m"\n'

@@ -135,7 +135,7 @@ def run_drive(drive):
     return result, {name: m.value for name, m in result.measures.items()}
 
 
-def test_exact_force_drive_equals_base_drive_in_relative_motion():
+def test_force_drive_equals_base_drive_in_relative_motion():
     """A force of mass times base acceleration gives the same relative motion and another absolute acceleration."""
     _, force = run_drive('kind = "force"\nfrequency = "143 Hz"\nforce = "39 N"\ncycles = 30')
     _, base = run_drive(

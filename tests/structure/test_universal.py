@@ -124,7 +124,7 @@ def test_exact_units_of_dataset_164_are_applied(tmp_path):
     )
 
 
-def test_exact_basis_from_node_directions(tmp_path):
+def test_basis_from_node_directions(tmp_path):
     """The rows of the basis are those of the node directions in the scene, scaled to the moving mass."""
     shapes = universal.read_universal(write_universal(tmp_path / "a.uff", normal_modes()))
     basis = places.build_basis(

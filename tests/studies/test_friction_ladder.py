@@ -16,7 +16,7 @@ def today(ladder):
     return ladder.today
 
 
-def test_exact_rms_error_of_coulomb_at_large_amplitude(ladder):
+def test_rms_error_of_coulomb_at_large_amplitude(ladder):
     """The rms difference of Coulomb's law from Dahl's falls with the fourth root of the amplitude."""
     dahl = ladder.last_cycle(ladder.points(ladder.bonds()), 400.0, 48_000)
     assert ladder.error(ladder.coulomb(dahl), dahl)[1] == pytest.approx(

@@ -41,7 +41,7 @@ def test_exact_free_decay_by_the_event_driven_solver(engines, problem):
     assert "decay" in problems and case.error(run(case, settings[-1])) < 1e-11
 
 
-def test_exact_saved_errors_are_reproduced(engines, problem, table):
+def test_saved_errors_are_reproduced(engines, problem, table):
     """The errors of the inexpensive rows of the saved table are reproduced within 2 %."""
     errors = {(row["problem"], row["engine"], row["knob"]): row["error"] for row in table["rows"]}
     for where in ("decay", "block", "two"):
@@ -58,7 +58,7 @@ def test_exact_saved_errors_are_reproduced(engines, problem, table):
                 assert case.error(run(case, setting)) == pytest.approx(saved, rel=0.02, abs=1e-11)
 
 
-def test_exact_saved_table_supports_the_stated_conclusions(work, table):
+def test_saved_table_supports_the_stated_conclusions(work, table):
     """Orders, smallest errors and ratios of CPU time in the saved table are those stated."""
     curve = lambda where, name: work.curve(table["rows"], where, name)[0]  # noqa: E731
     for where in ("block", "two"):

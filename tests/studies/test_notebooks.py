@@ -62,10 +62,10 @@ def kernel(tmp_path_factory):
             manager.shutdown_kernel(now=True)
 
 
-def test_always_code_of_own_joint_runs(tmp_path, monkeypatch):
-    """The code cells of a notebook run in this process, with their asserts."""
+def test_always_code_of_measured_loop_runs(tmp_path, monkeypatch):
+    """The code cells of the least expensive page run in this process, with their asserts."""
     monkeypatch.chdir(tmp_path)
-    exec(read_code("own_joint"), {})
+    exec(read_code("measured_loop"), {})
     assert not list(tmp_path.iterdir())
 
 

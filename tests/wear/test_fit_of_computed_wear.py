@@ -67,7 +67,7 @@ def test_exact_symmetric_depth_has_no_direction():
     assert correlated.depths.noise == pytest.approx(5 * found.depths.noise, rel=1e-9, abs=0)
 
 
-def test_exact_common_error_of_depths_widens_the_interval():
+def test_common_error_of_depths_widens_the_interval():
     """A standard deviation that all depths have in common moves the coefficient as depths that are larger by it do."""
     measured = measure_depth(0.7)._replace(datum_error=0.0)
     plain, moved, wide = (

@@ -112,7 +112,7 @@ class DraftJoint(TableFacts):
 
     @property
     def opposite_shape(self) -> str:
-        """Key of a shape on another piece than the shapes before it, the last one that is written; "" for none."""
+        """Key of the last gap shape that the scene writes, if shapes lie on both pieces; "" if all lie on one."""
         if len(set(self._sides.values())) < 2:
             return ""
         return next(filter(self.draft.has, reversed(self._sides)), next(iter(self._sides)))

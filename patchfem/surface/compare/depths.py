@@ -214,11 +214,11 @@ def _bend_datum(depth, unworn, base) -> np.ndarray:
 
 
 class Extreme(NamedTuple):
-    """Largest mean over windows of some side, and how many of them are as deep but for the noise.
+    """Largest mean depth over all windows of one size, and the number of windows that differ from it by noise alone.
 
     - value: largest mean [m]; sigma: its standard deviation [m].
-    - at: index of the middle of the window.
-    - n_places: number of independent windows that are as deep.
+    - at: index of the middle of its window.
+    - n_places: number of independent windows whose mean is as large, but for the noise.
     """
 
     value: float
@@ -227,7 +227,7 @@ class Extreme(NamedTuple):
     n_places: float
 
     def find_noise(self, probability: float, n_places: float) -> float:
-        """Return a quantile [m] of what noise alone adds to the largest of a number of means that are equally deep."""
+        """Return the quantile [m] of the largest noise in the means of `n_places` windows of equal depth."""
         return self.sigma * float(special.ndtri(probability ** (1 / n_places)))
 
 

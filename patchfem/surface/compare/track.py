@@ -93,8 +93,15 @@ def get_margin(span: tuple[int, int]) -> int:
 def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     """Find where a track begins and ends, each with its interval.
 
-    `span` are its first and last worn sample in the `depths`. Each end is the change point at which the depth leaves
-    zero, sought from outside to the middle, but not beyond tops that are not worn.
+    Each end is the point at which the depth begins to differ from zero, sought from outside to the middle of the track. It
+    lies behind the last asperities that are not worn.
+
+    Parameters
+    ----------
+    depths : DepthMap
+        Depths of the trace.
+    span : tuple of int
+        First and last worn sample.
     """
     # Pile-up beside a track is no flank; the windows that found the worn samples may reach into it.
     relative = depths.depth / depths.noise
@@ -346,9 +353,17 @@ def _measure_floor(depths: DepthMap, start: float, width: float) -> Quantity:
 def _measure_pile_up(depths: DepthMap, ends: tuple[End, End], width: float) -> tuple[float, float]:
     """Return the area [m2] of the ridges beside a track, and its standard deviation [m2].
 
-    `depths` are those of the trace, and the ridges are sought within one width of the `ends`. The area reaches from
-    both ends of the track to behind the ridges, whose low flanks are not found as grown. Where nothing is found as
-    grown, the error is what the noise may hide beside the track.
+    A ridge is material that has grown within one width of an end of the track. Its area includes a low outer flank that the
+    noise hides. Where no ridge is found, the standard deviation is that of the ridge which the noise could hide.
+
+    Parameters
+    ----------
+    depths : DepthMap
+        Depths of the trace.
+    ends : tuple of End
+        Beginning and end of the track.
+    width : float
+        Width of the track [m].
     """
     total = 0.0
     variance = 0.0

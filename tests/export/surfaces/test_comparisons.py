@@ -134,7 +134,7 @@ def test_exact_ends_of_an_interval_have_the_last_digit_of_the_value(numbers, tex
     )
 
 
-def test_exact_curves_are_in_csv_and_netcdf():
+def test_curves_are_in_csv_and_netcdf():
     """depth.csv and result.nc hold x, both heights and the depth of the comparison, and the ends of its track."""
     comparison = compare_traces()
     answer = compare.make_comparison_answer(comparison)

@@ -35,7 +35,7 @@ def sine_folder(tmp_path_factory):
     return answer, folder
 
 
-def test_exact_parameters_of_a_sine(sine_folder):
+def test_parameters_of_a_sine(sine_folder):
     """Ra = 2A/pi, Rq = A/sqrt(2), Rz = 2A, RSm = wavelength: in profile.json, in the headline and in profile.csv."""
     answer, folder = sine_folder
     (entry,) = read_json(folder / "profile.json")["profiles"]
@@ -55,7 +55,7 @@ def test_exact_parameters_of_a_sine(sine_folder):
     assert row[head.index("file")] == "sine.csv"
 
 
-def test_exact_profiles_are_curves(sine_folder):
+def test_profiles_are_curves(sine_folder):
     """primary.csv is the sum of waviness and roughness, and is read again as a trace with the same Pq."""
     answer, folder = sine_folder
     data = to_dataset(answer)
@@ -88,7 +88,7 @@ def test_exact_mean_of_files_uses_student_t():
     assert answer.data["abbott"].values.shape[0] == 3 and not answer.remarks.warnings
 
 
-def test_exact_scan_has_areal_parameters_and_a_map():
+def test_scan_has_areal_parameters_and_a_map():
     """A scan of four waves along x has Sq = A/sqrt(2), its map and no profile."""
     x = np.arange(160) * 2e-6
     z = np.tile(AMPLITUDE * np.cos(2 * np.pi * x / WAVELENGTH), (90, 1))

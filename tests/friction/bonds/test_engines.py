@@ -48,7 +48,7 @@ def load_rig_scene(tmp_path, engine="auto", reading="report", order=1):
 # ---- lists along a prescribed path
 
 
-def test_exact_printed_law_creates_energy_per_cycle():
+def test_printed_law_creates_energy_per_cycle():
     """The work per cycle agrees with its known value, and only the printed form of the law creates energy.
 
     Work equals dissipated energy, less the created energy, plus stored energy.

@@ -160,7 +160,7 @@ def test_exact_patch_bench_force_equals_average_resultant(order):
     assert result.values["energy_balance"] < 1e-12 and result.slip == pytest.approx(result.slide)
 
 
-def test_exact_symmetric_block_equals_reduced_coulomb():
+def test_symmetric_block_equals_reduced_coulomb():
     """A symmetric block on a rig moves as with Coulomb's law whose coefficient is reduced by the averaging."""
     text = FLAT + CROWN + AVERAGED.replace("1 mm", "300 um") + SHORT
     scene = loads(text)

@@ -35,7 +35,7 @@ def make_pair(depth: float, first: float, last: float) -> tuple[Profile, Profile
 
 @pytest.mark.skipif(not FILE.is_file(), reason="PATCHFEM_DATA has no dektak-1.csv")
 @pytest.mark.parametrize("depth", [0.1 * UM, 0.4 * UM, 2 * UM])
-def test_exact_scar_in_a_measured_trace(depth):
+def test_scar_in_a_measured_trace(depth):
     """Shift, ends, area, mean and largest depth of a scar of known shape lie in their intervals."""
     before, after, scar = make_pair(depth, 600 * UM, 900 * UM)
     found = compare_surfaces(before, after)

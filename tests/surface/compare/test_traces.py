@@ -47,7 +47,7 @@ def has_finding(comparison, code: str) -> bool:
 
 
 @pytest.mark.parametrize("depth", [0.1 * UM, 20 * UM])
-def test_exact_area_and_ends_of_parabola(depth):
+def test_area_and_ends_of_parabola(depth):
     """Area 2/3 depth x width, its mean over the common length, largest depth, ends and shift lie in narrow intervals."""
     worn = make_parabola(depth, 1500, 2500)
     found = compare_surfaces(*make_pair(worn))
@@ -77,7 +77,7 @@ def test_exact_area_and_ends_of_parabola(depth):
     assert values["common_length"].value == pytest.approx(length, rel=1e-3)
 
 
-def test_exact_floor_of_skew_groove_and_gain():
+def test_floor_of_skew_groove_and_gain():
     """The fifth of a skew triangle around its tip is .9 times as deep as the tip; the gain has an interval around 1."""
     worn = UM / 0.9 * np.interp(np.arange(4000), (1500, 2100, 2500), (0, 1, 0))
     before, after = make_pair(worn)
@@ -206,7 +206,7 @@ def test_exact_non_negative_least_squares_agrees_with_scipy(seed):
     assert solve_non_negative(columns, values) == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
-def test_exact_known_shift_is_used():
+def test_known_shift_is_used():
     """A known shift places traces that no search could place."""
     worn = make_parabola(0.2 * UM, 1500, 2500)
     pair = make_pair(worn, 5, noise=4 * NM, surface=draw_surface(5, rms=0.2 * NM))
@@ -214,7 +214,7 @@ def test_exact_known_shift_is_used():
     assert found.values["worn_area"].value == pytest.approx(worn.sum() * UM, rel=0.03)
 
 
-def test_exact_deposit_on_a_bowed_trace_is_growth():
+def test_deposit_on_a_bowed_trace_is_growth():
     """A deposit over a third of a trace with a bow is growth of the known area, not a track between flanks."""
     deposit = 1.2 * UM * np.sqrt(make_parabola(1.0, 1400, 2700))
     bow = UM * np.linspace(-1, 1, 4000) ** 2
@@ -284,7 +284,7 @@ def test_always_transfer_of_equal_area_is_worn_and_grown():
     assert found.values["grown_area"].value == pytest.approx(2 / 3 * UM * 800 * UM, rel=0.05)
 
 
-def test_exact_pile_up_is_measured_beside_the_track():
+def test_pile_up_is_measured_beside_the_track():
     """Ridges on both sides are pile-up, and the net area is the lost area less the pile-up."""
     worn = make_parabola(2 * UM, 1600, 2400)
     ridges = make_parabola(0.5 * UM, 1400, 1600) + make_parabola(0.5 * UM, 2400, 2600)
@@ -335,7 +335,7 @@ def test_always_loss_of_all_tops_is_no_step():
     assert mean.low <= np.maximum(common - plateau, 0.0).mean() <= mean.high
 
 
-def test_exact_spikes_and_dropouts_are_left_out():
+def test_spikes_and_dropouts_are_left_out():
     """Spikes, saturated dropouts and missing heights do not count, and the removed heights are counted."""
     before, after = make_pair(make_parabola(UM, 1500, 2500))
     z = after.z.copy()
@@ -357,7 +357,7 @@ def make_cosine(depth: float, first: int, last: int, count: int = 4000) -> np.nd
 
 
 @pytest.mark.parametrize("shape", [make_cosine, "flank of 100 um"])
-def test_exact_roughness_in_a_bent_track_is_that_of_the_unworn_surface(shape):
+def test_roughness_in_a_bent_track_is_that_of_the_unworn_surface(shape):
     """Ra, Rq and slope of a surface that was lowered by 20 um are unchanged, and those of ISO 21920-2 without the track.
 
     The reference is the Gaussian filter of the unworn trace, summed over all of its neighbours; the inside starts one

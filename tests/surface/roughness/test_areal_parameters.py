@@ -52,7 +52,7 @@ def test_exact_gradient_and_area_of_ramp():
         assert found["Sdr"] == pytest.approx(np.sqrt(1 + 0.4**2 + 0.7**2) - 1, rel=1e-12)
 
 
-def test_exact_parameters_of_sine_surface():
+def test_parameters_of_sine_surface():
     """The height parameters of whole sine waves agree with the closed forms."""
     report = make_report(make_scan(UM * make_plane_wave(100, 4000, 40.0, 0.0)))
     assert report["Sa"].value == pytest.approx(2 / np.pi * UM, rel=1e-2)
@@ -77,7 +77,7 @@ def test_exact_autocorrelation_is_mean_over_measured_pairs():
 
 
 @pytest.mark.parametrize("degrees", [0.0, 40.0])
-def test_exact_length_and_aspect_ratio_of_gaussian_surface(degrees):
+def test_length_and_aspect_ratio_of_gaussian_surface(degrees):
     """With autocorrelation exp(-(u/a)^2 - (v/b)^2), Sal = a sqrt(ln 5) within 5 % and Str = a/b within 10 %."""
     z = gaussian_surface(600, 600, 6.0, 18.0, degrees)
     found = compute_areal_parameters(z, (1.0, 1.0))

@@ -55,9 +55,7 @@ def test_exact_primary_profile_agrees_with_three_codes(measured_traces, referenc
         ("mitutoyo-2.csv.gz", 800),
     ],
 )
-def test_exact_roughness_profile_agrees_with_other_code(
-    measured_traces, reference_values, name, cutoff
-):
+def test_roughness_profile_agrees_with_other_code(measured_traces, reference_values, name, cutoff):
     """Parameters of the roughness profile agree with another code within 0.1 %, and Rq within 0.5 %."""
     expected = reference_values[name][f"own_gauss_lc{cutoff}"]
     report = make_report(measured_traces[name], cutoff * UM)

@@ -208,7 +208,7 @@ def split_trace(folder, waves) -> tuple:
     return nodes, patch.gap.evaluate(nodes).heights, patch.interface.skin, text
 
 
-def test_exact_cutoff_splits_trace_between_gap_and_asperities(tmp_path):
+def test_cutoff_splits_trace_between_gap_and_asperities(tmp_path):
     """Each wave of a trace counts once: the gap has the waviness, and the asperities have the roughness."""
     waves = [
         (1e-6, 2.54e-3),

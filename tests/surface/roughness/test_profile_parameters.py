@@ -48,7 +48,7 @@ def test_exact_sections_of_growing_sine():
     assert found["t"] == pytest.approx(198, rel=1e-9)
 
 
-def test_exact_core_of_gaussian_heights():
+def test_core_of_gaussian_heights():
     """The core parameters of Gaussian heights agree with those of the normal law within 0.1 %."""
     n = 200_001
     ratio = (np.arange(n) + 0.5) / n
@@ -63,7 +63,7 @@ def test_exact_core_of_gaussian_heights():
     assert [found["pk"], found["vk"]] == pytest.approx([2 * area / first] * 2, rel=1e-3)
 
 
-def test_exact_report_splits_waves_at_cutoff():
+def test_report_splits_waves_at_cutoff():
     """Of a wave of 1 mm and one of 50 um, a cut-off of 250 um leaves the short one in the roughness."""
     x = np.arange(12_000) * UM
     z = 3 * UM * np.sin(2 * np.pi * x / MM) + UM * np.sin(2 * np.pi * x / (50 * UM))
