@@ -36,7 +36,7 @@ from torture.grammar import draw_scene
 from torture.toml import to_toml
 from torture.trial import Trial
 for seed in range(int(sys.argv[2]), int(sys.argv[2]) + 4 * int(sys.argv[3])):
-    tables = draw_scene(Trial(np.random.default_rng(seed)))
+    tables = draw_scene(Trial(np.random.default_rng(seed), None, None, None))
     tables.get("contact", {}).pop("element_size", None)
     print(json.dumps([seed, to_toml(tables)]))
 """

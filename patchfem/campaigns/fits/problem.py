@@ -296,6 +296,7 @@ def _search_minimum(
                 return _Search(
                     number, before.problem, replace(earlier, outcome=Outcome.NOT_CONVERGED)
                 )
+        # A model that fails at all starting points is replaced, until there is no other one.
         while True:
             problem = _make_problem(comparison, training, earlier)
             try:

@@ -6,6 +6,7 @@ shows of a case is in the table (`SweepTable.insert`); a text that the files of 
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -21,15 +22,15 @@ from .answer import sort_measures
 N_ROWS_PER_PART = 4096  # rows of sweep.csv whose cells are in memory at the same time
 
 
-class CsvColumn(NamedTuple):
-    """Column of sweep.csv.
+# function of a slice of the cases that returns their cells, "" for a missing number
+CellLister = Callable[[slice], Iterable[str]]
 
-    - heading: its first cell.
-    - list_cells: function of a slice of the cases that returns their cells, "" for a missing number.
-    """
+
+class CsvColumn(NamedTuple):
+    """Column of sweep.csv: its first cell, and the function that lists the others."""
 
     heading: str
-    list_cells: Callable[[slice], Iterable[str]]
+    list_cells: CellLister
 
 
 def list_columns(
@@ -48,41 +49,36 @@ def list_columns(
     case_folders : sequence of str
         Folders of the cases; empty if there are none.
     """
-
-    def list_keys(number: int) -> CsvColumn:
-        """Return the column of the swept key with this number."""
-        axis = cases.axes[number]
-
-        def list_cells(part: slice) -> list[str]:
-            """Return the values of the key as they were written."""
-            indices = cases.axis_indices(np.arange(len(table))[part])
-            return [axis.texts[index] for index in indices[number].tolist()]
-
-        return CsvColumn(axis.key, list_cells)
-
-    def list_numbers(heading: str, numbers: np.ndarray, number_format: str) -> CsvColumn:
-        """Return a column of numbers (n,)."""
-        return CsvColumn(heading, lambda part: _format_numbers(numbers[part], number_format))
-
-    def list_texts(heading: str, texts: dict[int, str]) -> CsvColumn:
-        """Return a column of texts by the number of the case."""
-        numbers = range(len(table))
-        return CsvColumn(heading, lambda part: [texts.get(number, "") for number in numbers[part]])
-
-    measures = []
+    columns = []
+    for number, axis in enumerate(cases.axes):
+        columns.append(CsvColumn(axis.key, partial(_list_values_of_key, cases, number)))
+    columns.append(CsvColumn(OUTCOME_COLUMN, partial(_list_words, table.outcome)))
     for name in sort_measures(table):
         column = table.measures[name]
-        measures.append(list_numbers(name, column.values, "%r"))
-        measures.append(list_numbers(f"{name}_error", column.errors, "%.6g"))
-    columns = [
-        *map(list_keys, range(len(cases.axes))),
-        CsvColumn(OUTCOME_COLUMN, lambda part: map(str, table.outcome[part])),
-        *measures,
-        list_texts("message", table.messages),
-    ]
+        columns.append(CsvColumn(name, partial(_list_numbers, column.values, "%r")))
+        columns.append(CsvColumn(f"{name}_error", partial(_list_numbers, column.errors, "%.6g")))
+    texts = [table.messages.get(number, "") for number in range(len(table))]
+    columns.append(CsvColumn("message", partial(_list_words, texts)))
     if case_folders:
-        columns.append(CsvColumn("case", lambda part: case_folders[part]))
+        columns.append(CsvColumn("case", partial(_list_words, case_folders)))
     return columns
+
+
+def _list_values_of_key(cases: Cases, number: int, part: slice) -> list[str]:
+    """Return the values of the swept key `number` in a part of the cases, as they were written."""
+    indices = cases.axis_indices(np.arange(len(cases))[part])[number]
+    return [cases.axes[number].texts[index] for index in indices.tolist()]
+
+
+def _list_words(words: Sequence[str], part: slice) -> Iterable[str]:
+    """Return the words (n,) of a part of the cases."""
+    return map(str, words[part])
+
+
+def _list_numbers(numbers: np.ndarray, number_format: str, part: slice) -> list[str]:
+    """Return the numbers (n,) of a part of the cases as strings; "" for NaN."""
+    values = numbers[part].astype(float).tolist()
+    return ["" if value != value else number_format % value for value in values]
 
 
 def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path: Path) -> None:
@@ -109,9 +105,3 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
     header = [column.heading for column in columns]
     parts = map(make_rows, range(0, len(table), N_ROWS_PER_PART))
     write_rows(path, chain([header], chain.from_iterable(parts)))
-
-
-def _format_numbers(numbers: np.ndarray, number_format: str) -> list[str]:
-    """Return numbers as strings; "" for NaN."""
-    values = numbers.astype(float).tolist()
-    return ["" if value != value else number_format % value for value in values]

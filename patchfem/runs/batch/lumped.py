@@ -297,8 +297,9 @@ def march_group(group: Group) -> list[tuple[np.ndarray, Refined]]:
 
     done = []
 
-    def march(level: int, before: OpenMarch) -> OpenMarch:
+    def march(level: int, before: OpenMarch | None) -> OpenMarch:
         """March the open cases with more steps, and put those that end with it into the list."""
+        before = before or start
         count = BATCH_STEPS_PER_CYCLE[level]
         part = _select(group, before.numbers)
         fine = march_cases(part.cases, count)
@@ -320,7 +321,7 @@ def march_group(group: Group) -> list[tuple[np.ndarray, Refined]]:
 
     coarse = march_cases(group.cases, BATCH_STEPS_PER_CYCLE[0]).values
     start = OpenMarch(0, np.arange(len(group.tolerance)), [coarse])
-    refine(lambda level, before: march(level, before or start), 1, judge, NO_LIMIT)
+    refine(march, 1, judge, NO_LIMIT)
     return done
 
 
