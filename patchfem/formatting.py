@@ -43,6 +43,10 @@ _POWER_PATTERN = re.compile(
 )
 
 
+# Pattern of a length below a metre without an exponent
+_SHORT_LENGTH_PATTERN = re.compile(r"(?<![\w./\"'-])(-?0\.\d+) m(?![\w/^])")
+
+
 def choose_unit(ladder: tuple[DisplayUnit, ...], size: float) -> DisplayUnit:
     """Choose the unit in which a number has few digits before and after the decimal point.
 
@@ -243,7 +247,7 @@ def format_length(length: float, digits: int = 4) -> str:
 
 
 def rewrite_powers_of_ten(text: str) -> str:
-    """Rewrite the numbers of a text with readable units, such as 302 nJ for 3.02e-07 J."""
+    """Rewrite the numbers of a text with readable units, such as 302 nJ for 3.02e-07 J, and 6.35 mm for 0.00635 m."""
 
     def rewrite(match) -> str:
         """Return the readable form of a matched number with its unit."""
@@ -253,7 +257,8 @@ def rewrite_powers_of_ten(text: str) -> str:
             return format_number(float(number), digits)
         return format_quantity(float(number), SENTENCE_UNITS[unit], digits)
 
-    return _POWER_PATTERN.sub(rewrite, text)
+    text = _POWER_PATTERN.sub(rewrite, text)
+    return _SHORT_LENGTH_PATTERN.sub(lambda match: format_length(float(match[1]), 9), text)
 
 
 def _is_written_without_exponent(power: int) -> bool:

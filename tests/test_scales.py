@@ -106,6 +106,9 @@ def test_exact_value_with_error_is_formatted(value, error, least, unit, text):
         ("run_1e-05.csv: 3e5", "run_1e-05.csv: 300000"),
         ('set it to "1e-05 m"', 'set it to "1e-05 m"'),
         ("out/1e-05 and .1e-05", "out/1e-05 and .1e-05"),
+        ("|offset| < length/2 = 0.00635 m is needed", "|offset| < length/2 = 6.35 mm is needed"),
+        ("x = -0.00123456 m, 0.05 N m", "x = -1.23456 mm, 0.05 N m"),
+        ('"0.01 m", 0.5 m/s, 0.001 m^2', '"0.01 m", 0.5 m/s, 0.001 m^2'),
     ],
 )
 def test_exact_powers_of_ten_become_unit_prefixes(text, tidy):

@@ -13,7 +13,7 @@ from ..campaigns.backbone.records import (
 )
 from ..campaigns.backbone.request import BackboneCases, BackboneRequest, compute_cases
 from ..core import PatchfemError
-from ..formatting import format_number, format_quantity
+from ..formatting import format_number, format_quantity, rewrite_powers_of_ten
 from ..model.model import Model
 from ..model.source import Source
 from ..scene.assignments import Axis
@@ -87,8 +87,8 @@ def make_backbone_answer(backbone: Backbone, source: Source) -> Answer:
 
 
 def _make_sentence(text: str) -> str:
-    """Return a clause with a capital at its start and a full stop."""
-    return f"{text[0].upper()}{text[1:].rstrip('.')}."
+    """Return a clause with a capital at its start, a full stop, and readable powers of ten."""
+    return rewrite_powers_of_ten(f"{text[0].upper()}{text[1:].rstrip('.')}.")
 
 
 def draw_backbone(dataset, ax=None):

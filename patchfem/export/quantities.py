@@ -34,8 +34,9 @@ KEY_QUANTITY_NAMES = tuple(
     frequency_at_smallest_amplitude frequency_at_largest_amplitude damping_at_smallest_amplitude
     damping_at_largest_amplitude force_at_smallest_amplitude force_at_largest_amplitude largest_damping
     amplitude_of_largest_damping compared_amplitude frequency_change damping_change force_change free_frequency
-    stuck_frequency cpu_time largest_error worn_depth_mean worn_depth_max worn_area worn_volume track_width
-    track_depth wear_coefficient amplitude_ratio slope_ratio Ra Rq Rz RSm Rsk Rk Pa Pq Pt Sa Sq Sz Ssk Sdr Sal
+    stuck_frequency cpu_time largest_error worn_depth_mean worn_depth_max worn_top_height touching_fraction worn_area
+    worn_volume track_width track_depth wear_coefficient amplitude_ratio slope_ratio Ra Rq Rz RSm Rsk Rk Pa Pq Pt Sa Sq
+    Sz Ssk Sdr Sal
     relative_displacement_amplitude relative_displacement_rms absolute_acceleration_peak absolute_acceleration_rms
     response_frequency response_damping slip_amplitude equivalent_stiffness equivalent_damping loop_area
     friction_power friction_force_peak friction_ratio_peak flutter_amplitude onset_level

@@ -77,8 +77,9 @@ def _make_headline(result: Result, measures: Quantities, details: JsonObject) ->
                     part = part.replace("of the length", "of the face")
                 if kind == "patch":
                     part += _describe_place(details.get("contact"), " ({})")
-            if name == "worn_depth_max" and result.plan.model.patch.gap.is_split:
-                part += " of the mean over the short waves"
+            if name == "worn_depth_max":
+                is_mean = "worn_top_height" in measures or patch_model.gap.is_split
+                part += " of the mean over the short waves" * is_mean
             parts.append(part)
     if not parts:
         return ""

@@ -6,6 +6,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from command_line import read_json, read_page, run_successfully
@@ -35,8 +36,9 @@ from scene_texts import (
     SWEEP,
 )
 
-from patchfem.export import page, quantities, store
-from patchfem.export.charts import panels
+from patchfem.export import backbones, page, quantities, store
+from patchfem.export.charts import panels, plotly
+from patchfem.export.charts.panel import Axis, Curve, Panel
 from patchfem.export.rows import CHARTS
 
 LEVELS = DRIVE.replace(
@@ -223,6 +225,29 @@ def test_exact_response_curves_stand_in_order_of_their_levels(folders):
     panel = panels.make_panels(ordered, CHARTS[answer.kind])[0]
     assert [curve.name for curve in panel.curves] == ["0.5", "3", "4"]
     assert panel.title == "Steady motions" and panel.y.is_log
+
+
+def test_exact_round_off_does_not_stretch_a_logarithmic_axis():
+    """A value of round-off beside large ones lies outside of a logarithmic axis, and a menu resets the range."""
+    x = np.arange(4.0)
+    panels_of_menu = [
+        Panel(title, "line", Axis("x"), Axis("y", is_log=True), [Curve("", x, np.array(values))])
+        for title, values in (("first", [1e-24, 2e-3, 1.0, 5.0]), ("second", [1.0, 2.0, 3.0, 4e3]))
+    ]
+    menu = replace(panels_of_menu[0], style="menu", choices=panels_of_menu)
+    layout = plotly.make_plotly_figure(menu)["layout"]
+    low, high = layout["yaxis"]["range"]
+    assert -3.2 < low < np.log10(2e-3) < np.log10(5) < high < 1
+    first, second = (button["args"][1] for button in layout["updatemenus"][0]["buttons"])
+    assert first["yaxis.range"] == [low, high] and not first["yaxis.autorange"]
+    assert second["yaxis.range"] is None and second["yaxis.autorange"]
+
+
+def test_exact_note_of_a_backbone_has_no_padded_power_of_ten():
+    """A clause on a backbone becomes a sentence in which 1e-05 is 1e-5."""
+    clause = "the band holds the numerical error: at most 1e-05 % of the frequency."
+    sentence = "The band holds the numerical error: at most 1e-5 % of the frequency."
+    assert backbones._make_sentence(clause) == sentence
 
 
 def test_exact_compliance_of_response_curves_is_a_choice_of_a_menu(folders):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..quantities import VALUE_ROUND_OFF
 from .panels import Curve, Panel
 
 CURVE_COLOURS = (
@@ -77,6 +78,12 @@ def _make_axis_layout(axis, columns) -> Figure:
         # By default the labels of one or two decades are all digits, which overlap.
         values = np.concatenate([np.ravel(column) for column in columns])
         values = values[np.isfinite(values) & (values > 0)]
+        # Round-off beside large values would stretch the axis over many decades.
+        is_known = values > VALUE_ROUND_OFF * values.max(initial=0.0)
+        if not is_known.all():
+            ends = np.log10([values[is_known].min(), values.max()])
+            room = 0.05 * np.ptp(ends) + 0.02
+            layout["range"] = [ends[0] - room, ends[1] + room]
         if values.size and 1 < np.log10(values.max() / values.min()) < MAX_DECADES_WITH_DIGITS:
             layout["dtick"] = "D2"
     return layout
@@ -185,7 +192,8 @@ def _add_menu(figure: Figure, choices: list[Panel]) -> None:
         layout = _make_layout(choice)
         for name in ("xaxis", "yaxis"):
             axis = layout[name]
-            changes |= {f"{name}.{key}": axis.get(key) for key in ("type", "dtick")}
+            changes |= {f"{name}.{key}": axis.get(key) for key in ("type", "dtick", "range")}
+            changes[f"{name}.autorange"] = "range" not in axis
             changes[f"{name}.title.text"] = axis["title"]["text"]
         arguments = [{"visible": visible}, changes]
         buttons.append({"label": choice.title, "method": "update", "args": arguments})

@@ -81,10 +81,8 @@ def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRa
     column = table.select_trusted(name)
     round_off = VALUE_ROUND_OFF * np.nanmax(np.abs(column.values), initial=0.0)
     ends = [0.0 if abs(column.values[case]) <= round_off else column.values[case] for case in cases]
-    low, high = (
-        _format_measure(name, column.unit, end, _find_large_error(table, name, case))
-        for end, case in zip(ends, cases)
-    )
+    errors = [_find_large_error(table, name, case) for case in cases]
+    low, high = (_format_measure(name, column.unit, *end) for end in zip(ends, errors))
     varied = [key for key in table.keys if key.count > 1]
     if len(varied) != 1:
         share = ""
@@ -107,8 +105,7 @@ def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRa
                 continue
             numbers = (extreme.place, *extreme.band)
             place, begin, end = (format_value(one, extreme.unit) for one in numbers)
-            case = cases[extreme.is_largest]
-            error = _find_large_error(table, name, case)
+            error = errors[extreme.is_largest]
             value = _format_measure(name, column.unit, extreme.value, error)
             words += f" ({side}, {value}, at {place}, {first} to {last}; within 5 % of it from {begin} to {end})"
     return words

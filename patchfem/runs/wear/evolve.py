@@ -400,6 +400,15 @@ def solve_worn(patch, worn, layer: RoughLayer | None = None):
 
     Tops of a rough layer that wears lose more height than this depth, so that the gap under load opens further; the
     unloaded gap remains that of the mean surfaces.
+
+    Parameters
+    ----------
+    patch : Patch
+        Patch on its mesh or cells.
+    worn : (m,) array
+        Depth [m] worn off both pieces.
+    layer : RoughLayer, optional
+        Layer that wears.
     """
     opening = worn if layer is None else frozen_array(layer.measure_opening(worn))
     if patch.model.area is not None:

@@ -243,12 +243,11 @@ def _estimate_jump_errors(evolved) -> Values:
         "worn_depth_max": state.error,
     }
     # What a rough layer has lost is a function of the depth at each node.
+    values = compute_worn_values(patch, state.depth, evolved.layer)
     moved = state.depth + changes + state.path_error
-    values, ends = (
-        compute_worn_values(patch, depth, evolved.layer) for depth in (state.depth, moved)
-    )
-    others = values.keys() - errors.keys()
-    return errors | {name: abs(ends[name] - values[name]) for name in sorted(others)}
+    for name, value in compute_worn_values(patch, moved, evolved.layer).items():
+        errors.setdefault(name, abs(value - values[name]))
+    return errors
 
 
 def _measure_worn_friction(model, evolved, motion: Measures, error: float | None) -> Measures:
