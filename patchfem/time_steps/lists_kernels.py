@@ -16,8 +16,6 @@ from .step_rows_kernels import ListRow, Value
 def slide_lists(lists, numbers, values, count, step):
     """Slide a block of points; the package describes the arguments (`time_steps`).
 
-    The force at the end changes by about twice the slope of the mean.
-
     Parameters
     ----------
     lists : friction.bonds.strip_rows_kernels.BondLists
@@ -34,13 +32,14 @@ def slide_lists(lists, numbers, values, count, step):
         middle = 0.5 * (values[Value.START_LOAD + j] + values[Value.END_LOAD + j])
         lists.states[k, ListState.LOAD] = middle
         bonds = BondList(lists.strips[k], lists.states[k], lists.law[k], lists.growth[k])
-        velocity = values[Value.START_VELOCITY + j]
-        force = slide_list(bonds, values[Value.SLIDE + j], velocity, step.duration)
+        start = values[Value.START_VELOCITY + j]
+        velocity = values[Value.VELOCITY + j]
+        force = slide_list(bonds, values[Value.SLIDE + j], start, velocity, step.duration)
         friction = numbers[ListRow.FRICTION + j]
         values[Value.MEAN + j] = friction * force.mean
         values[Value.END + j] = friction * force.end
-        values[Value.MEAN_BY_SLIDE + j] = friction * force.slope
-        values[Value.END_BY_SLIDE + j] = 2 * friction * force.slope
+        values[Value.MEAN_BY_SLIDE + j] = friction * force.mean_slope
+        values[Value.END_BY_SLIDE + j] = friction * force.end_slope
         values[Value.MEAN_BY_VELOCITY + j] = values[Value.END_BY_VELOCITY + j] = 0.0
 
 

@@ -9,10 +9,7 @@ solve
 
 with the path means and the forces f0, f1 at both ends of the laws (`laws_kernels`), the stiffness kappa of the coordinates
 and w = |d|/(|ds| + |d|). The pieces are in equilibrium at the end of a step, so that a law of the path alone is exact at the
-samples of a monotone stroke, whatever the step. F dq is the work of the laws plus the change of the elastic energy. The
-force of a list of bonds jumps as bonds change their sign, so that there may be no equilibrium at the end of a step. Lists
-balance by their path means, F = sum of means and kappa (b + db/2) = shapes^T mean, where the derivatives of a potential
-vanish.
+samples of a monotone stroke, whatever the step. F dq is the work of the laws plus the change of the elastic energy.
 
 Newton's method has the Jacobian in the space of ports and coordinates. With lists, and in steps of the last level, a
 line search finds the minimum. A step that it does not solve is halved. Loads that follow from the motion (normal
@@ -35,7 +32,6 @@ none.
 
 import numpy as np
 
-from ..friction.bonds.strip_rows_kernels import ListLaw
 from ..kernel_cache.flags_kernels import NJIT_CALL
 from ..kernel_cache.jit import njit
 from . import flanks_kernels as flanks
@@ -63,7 +59,7 @@ from .motion_kernels import (
     store_base,
     subtract_step,
 )
-from .step_rows_kernels import VECTOR, WIDTH, Law, ListRow, Step, Value
+from .step_rows_kernels import VECTOR, WIDTH, Law, Step, Value
 
 MAX_NEWTON_ITERATIONS = 60  # Newton iterations of a step
 MAX_LOAD_ITERATIONS = (
@@ -184,15 +180,7 @@ def weigh_block(points, block, damping, step):
         return
 
     # Behind pieces it is the path mean over the part that slides, and the mean of both ends over the part of the pieces.
-    # Lists whose force jumps act on pieces by their path means, over both parts.
-    by_means = balances_by_means(points, block)
     for j in range(n_lanes):
-        if by_means:
-            values[Value.FORCE + j] = values[Value.MEAN + j]
-            values[Value.BY_SLIDE + j] = values[Value.MEAN_BY_SLIDE + j]
-            values[Value.BY_SHEAR + j] = -values[Value.MEAN_BY_SLIDE + j]
-            values[Value.BY_VELOCITY + j] = 0.0
-            continue
         slide = values[Value.SLIDE + j]
         bent = values[Value.BENT + j]
         path = abs(slide) + abs(bent) + TINY
@@ -365,37 +353,16 @@ def write_residual(system, level):
             vector[p] -= ports.redundant[p] * moves[Port.FORCE, p]
     largest = find_port_residual(system, level, size)
 
-    # kappa (b + db) = shapes^T f1, for lists kappa (b + db/2) = shapes^T mean
+    # kappa (b + db) = shapes^T f1
     shear = points.pieces.shear
     for k in range(points.pieces.stiffness.size):
-        weight = find_shear_weight(points, k)
-        row = Value.END if weight == 1.0 else Value.MEAN
-        residual = shear[Shear.VALUE, k] + weight * shear[Shear.TRIAL, k]
+        residual = shear[Shear.VALUE, k] + shear[Shear.TRIAL, k]
         residual *= points.pieces.stiffness[k]
         for block in range(points.pieces.bent[k, 0], points.pieces.bent[k, 1]):
-            residual -= sum_shape(points, k, block, row)
+            residual -= sum_shape(points, k, block, Value.END)
         vector[n_ports + k] = residual
         largest = max(largest, abs(residual) * shear[Shear.SCALE, k] / (RESIDUAL * size))
     return largest
-
-
-@njit(**NJIT_CALL)
-def find_shear_weight(points, k):
-    """Return the part of a step at whose end shear coordinate k is in equilibrium: 1, or 1/2 for lists whose force jumps."""
-    return 0.5 if balances_by_means(points, points.pieces.bent[k, 0]) else 1.0
-
-
-@njit(**NJIT_CALL)
-def balances_by_means(points, block):
-    """Return whether pieces take the path means of a block: a list whose force jumps, with reading "report" or of order 0.
-
-    The end of a step has no equilibrium at a jump. A force that is continuous is balanced at the end: with path means, the
-    slide behind pieces that are softer than the bonds alternates from step to step.
-    """
-    if points.blocks.law[block] != Law.LIST:
-        return False
-    law = points.lists.law[int(points.numbers[block, ListRow.INDEX])]
-    return law[ListLaw.IS_STRETCH] * law[ListLaw.ORDER] == 0.0
 
 
 @njit(**NJIT_CALL)
@@ -472,7 +439,7 @@ def write_matrix(system, level, step):
     n_ports = moves.shape[1]
     matrix[:] = 0.0
     for k in range(points.pieces.stiffness.size):
-        matrix[n_ports + k, n_ports + k] = find_shear_weight(points, k) * points.pieces.stiffness[k]
+        matrix[n_ports + k, n_ports + k] = points.pieces.stiffness[k]
     for p in range(n_ports):
         damping = moves[Port.DAMPING, p]
         start = points.pieces.shears[p, 0]
@@ -525,8 +492,6 @@ def write_products(points, p, matrix, n_ports, step):
     """
     start = points.pieces.shears[p, 0]
     stop = points.pieces.shears[p, 1]
-    weight = find_shear_weight(points, start)
-    by_slide_row = Value.END_BY_SLIDE if weight == 1.0 else Value.MEAN_BY_SLIDE
     for k in range(start, stop):
         points.pieces.products[k, 0] = 0.0
         points.pieces.products[k, 1] = 0.0
@@ -539,7 +504,7 @@ def write_products(points, p, matrix, n_ports, step):
             by_slide = 0.0
             by_shear = 0.0
             for j in range(n_lanes):
-                slope = values[by_slide_row + j]
+                slope = values[Value.END_BY_SLIDE + j]
                 slope += step.rate * values[Value.END_BY_VELOCITY + j]
                 weighted = shape[at + j] * slope
                 values[Value.WEIGHTED + j] = weighted
@@ -1048,8 +1013,12 @@ def solve_step(system, level, row, end):
     duration = system.options.step / (1 << level)
     find_damping(system, level)
     if system.structure.path.size:
-        # A prescribed slide has a constant velocity in each step.
+        # A prescribed slide has a constant velocity in each step. Lists behind pieces keep their own, by which bonds grow.
         for block in range(points.blocks.law.size):
+            port = points.blocks.port[block]
+            is_behind = points.pieces.shears[port, 0] < points.pieces.shears[port, 1]
+            if is_behind and points.blocks.law[block] == Law.LIST:
+                continue
             for j in range(points.blocks.count[block]):
                 points.values[block, Value.START_VELOCITY + j] = moves[Port.VELOCITY, 0]
 

@@ -103,19 +103,27 @@ tolerance = 0.003
 """
 
 
-def test_list_of_bonds_behind_a_soft_holder_has_errors_that_hold():
-    """A list of order 1.44 behind a holder that is 100 times softer agrees with an integration of its equations.
+@pytest.mark.parametrize(
+    ("order", "reading", "references", "difference"),
+    [
+        ("1.44", "stretch", (47.1224, 3.82256e-6, 1.03445e-5), 1e-3),
+        ("0", "stretch", (46.9619, 2.9521e-7, 1.44778e-6), 1e-2),
+        ("0.5", "report", (47.1333, 7.477e-8, 2.1393e-6), 1e-1),
+    ],
+)
+def test_list_of_bonds_behind_a_soft_holder_has_errors_that_hold(
+    order, reading, references, difference
+):
+    """A list behind a holder that is 100 times softer and more agrees with an integration of its equations.
 
-    The references are of a sum over bonds behind a spring, solved in 33 000 steps. With path means of the force in
-    equilibrium, the slide alternates from step to step, and the work is half as large again.
+    The references are of a sum over bonds behind a spring, solved in 16 000 or 33 000 steps. With path means of the force
+    in equilibrium, the slide alternates from step to step: the work of order 1.44 is half as large again, and the peak of
+    order 0 is 79 N. The last two loops are small differences of the work of the holder, so that their errors are large.
     """
-    measures = run(load(HELD)).measures
-    references = {
-        "friction_force_peak": 47.1224,
-        "loop_area": 3.82256e-6,
-        "friction_work": 1.03445e-5,
-    }
-    for name, reference in references.items():
+    text = HELD.replace("order = 1.44", f'order = {order}\nreading = "{reading}"')
+    measures = run(load(text)).measures
+    for name, reference in zip(("friction_force_peak", "loop_area", "friction_work"), references):
         measure = measures[name]
         assert abs(measure.value - reference) <= measure.error + 1e-5 * reference, name
-        assert measure.error < 0.05 * reference, name
+        assert abs(measure.value - reference) <= difference * reference, name
+    assert measures["friction_force_peak"].error < 0.02 * references[0]

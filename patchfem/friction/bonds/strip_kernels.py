@@ -49,11 +49,15 @@ MAX_FILLED_FRACTION = 0.75
 
 
 class ListForce(NamedTuple):
-    """Force of a list over mu_s [N]: mean over the path of an increment, force at its end, and slope of the mean [N/m]."""
+    """Force of a list over mu_s [N]: mean over the path of an increment and force at its end, with their slopes [N/m].
+
+    The slope of the end is that of a constant bond length.
+    """
 
     mean: float
     end: float
-    slope: float
+    mean_slope: float
+    end_slope: float
 
 
 class Increment(NamedTuple):
@@ -217,6 +221,7 @@ def pull_new_strips(state, law, increment):
         scale *= power(increment.middle, order)
     mean = 0.0
     end = 0.0
+    slope = 0.0
     n = find_new_strips(state, law, increment)
     for i in range(count_parts(n) if n > 0 else 0):
         strip = make_new_strip(i, n, state, law, increment)
@@ -224,6 +229,7 @@ def pull_new_strips(state, law, increment):
         young = ends.first
         old = ends.last
         weight = scale * strip.weight
+        slope = state[ListState.LOAD] / law[ListLaw.LENGTH] * old.strength  # of the oldest bonds
         if is_narrow(ends):
             force = weight * average_strength(young, old)
             end += force
@@ -232,12 +238,12 @@ def pull_new_strips(state, law, increment):
 
         # R is linear in x.
         spread = old.age - young.age
-        slope = (strip.age_2 - strip.age_1) / spread
+        per_age = (strip.age_2 - strip.age_1) / spread
         force = weight * (old.integral - young.integral) / spread
         moment = weight * (find_moment(old, order) - find_moment(young, order)) / spread
         end += force
-        mean += force - ((strip.age_1 - slope * young.age) * force + slope * moment) / path
-    return ListForce(mean, end, 0.0)
+        mean += force - ((strip.age_1 - per_age * young.age) * force + per_age * moment) / path
+    return ListForce(mean, end, 0.0, slope)
 
 
 # ---- bonds that formed before
@@ -371,21 +377,41 @@ def pull_strip(strip, law, moved, slide):
         Value with the sign of the increment.
     """
     stretches = find_stretches(strip, moved.path if slide > 0 else -moved.path)
+    rate = find_rate(law, moved, slide)
     if law[ListLaw.IS_STRETCH] * law[ListLaw.ORDER] != 0.0:
-        return pull_powers(find_ages(strip, law, moved), strip.weight, stretches, law)
-    return pull_signs(find_ends(strip, law, moved), strip.weight, stretches, law)
+        return pull_powers(find_ages(strip, law, moved), strip.weight, stretches, law, rate)
+    return pull_signs(find_ends(strip, law, moved), strip.weight, stretches, law, rate)
 
 
 @njit(**NJIT_KERNEL)
-def slide_list(bonds, slide, velocity, dt):
+def find_rate(law, moved, slide):
+    """Return the change of the ages [bond lengths], or damages, of bonds by the slide [1/m], at a constant bond length.
+
+    Parameters
+    ----------
+    law : (k,) array
+        Entries of `ListLaw`.
+    moved : Moved
+        Change of the bonds.
+    slide : float
+        Value with the sign of the increment.
+    """
+    length = moved.length
+    if law[ListLaw.IS_STRETCH] > 0 and moved.path > 0:
+        length = moved.path / moved.damage
+    return 1 / length if slide > 0 else -1 / length
+
+
+@njit(**NJIT_KERNEL)
+def slide_list(bonds, slide, v_0, v_1, dt):
     """Return the `ListForce` of a list over an increment, without changing the list.
 
     Parameters
     ----------
     bonds : BondList
         List of a point.
-    slide, velocity, dt : float
-        Increment [m], velocity [m/s] that determines the growth, and duration [s].
+    slide, v_0, v_1, dt : float
+        Increment [m], velocities [m/s] at the ends, and duration [s].
     """
     strips = bonds.strips
     state = bonds.state
@@ -395,25 +421,29 @@ def slide_list(bonds, slide, velocity, dt):
     probe = slide
     if abs(slide) < smallest:
         probe = smallest if slide >= 0 else -smallest
-    increment = make_increment(state, bonds.growth, probe, velocity, velocity, dt)
+    increment = make_increment(state, bonds.growth, probe, v_0, v_1, dt)
     last = move(increment, 1.0)
     new = pull_new_strips(state, law, increment)
     mean = new.mean
     end = new.end
+    slope = new.end_slope
+    rate = find_rate(law, last, probe)
     has_powers = law[ListLaw.IS_STRETCH] * law[ListLaw.ORDER] != 0.0
     ends = find_ends(read_strip(strips, 0), law, last)
     for k in range(int(state[ListState.COUNT])):
         strip = read_strip(strips, k)
         if has_powers:
-            end += pull_strip(strip, law, last, probe).force
+            pull = pull_strip(strip, law, last, probe)
         else:
             ends = find_ends(strip, law, last)
-            stretches = find_stretches(strip, probe)
-            end += pull_signs(ends, strip.weight, stretches, law).force
+            pull = pull_signs(ends, strip.weight, find_stretches(strip, probe), law, rate)
+        end += pull.force
+        slope += pull.slope
         mean += slide_strip(strip, law, increment, ends)
-    slope = (end - mean) / probe
+    # Bonds that grow change the force without a slide too.
+    mean_slope = 0.5 * slope if increment.growth > 0 else (end - mean) / probe
     change = slide - probe
-    return ListForce(mean + change * slope, end + 2 * change * slope, slope)
+    return ListForce(mean + change * mean_slope, end + change * slope, mean_slope, slope)
 
 
 # ---- the list after an increment

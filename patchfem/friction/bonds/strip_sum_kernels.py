@@ -13,6 +13,7 @@ from typing import NamedTuple
 from ...kernel_cache.flags_kernels import NJIT_KERNEL
 from ...kernel_cache.jit import njit
 from .decay_kernels import (
+    MIN_AGE,
     NJIT_INLINE,
     Decay,
     average_integral,
@@ -69,10 +70,11 @@ class Stretches(NamedTuple):
 
 
 class Pull(NamedTuple):
-    """Force [N] and stored energy [J] of a strip over mu_s."""
+    """Force [N] and stored energy [J] of a strip over mu_s, and the slope of the force at constant bond lengths [N/m]."""
 
     force: float
     energy: float
+    slope: float
 
 
 class Term(NamedTuple):
@@ -159,7 +161,7 @@ def is_narrow(ends):
 
 
 @njit(**NJIT_KERNEL)
-def pull_signs(ends, weight, stretches, law):
+def pull_signs(ends, weight, stretches, law, rate):
     """Return the `Pull` of a strip whose bonds act with the signs of their stretches.
 
     Parameters
@@ -172,32 +174,40 @@ def pull_signs(ends, weight, stretches, law):
         Stretches of its ends.
     law : (k,) array
         Entries of `ListLaw`.
+    rate : float
+        Change of the ages by the slide [1/m], negative for a slide to -x.
     """
     u_1 = stretches.first
     u_2 = stretches.last
     span = u_2 - u_1
+    order = law[ListLaw.ORDER]
     if span == 0:
-        return Pull(0.0, 0.0)  # a path within round-off has formed no bonds
+        return Pull(0.0, 0.0, 0.0)  # a path within round-off has formed no bonds
+    sign_1 = copysign(1.0, u_1)
+    sign_2 = copysign(1.0, u_2)
     if is_narrow(ends):
+        # The strength x^p exp(-x) changes by p/x - 1 of it.
         scale = 0.5 * weight * (ends.first.strength + ends.last.strength) / span
-        return Pull(scale * (abs(u_2) - abs(u_1)), 0.5 * scale * (u_2 * abs(u_2) - u_1 * abs(u_1)))
+        force = scale * (abs(u_2) - abs(u_1))
+        energy = 0.5 * scale * (u_2 * abs(u_2) - u_1 * abs(u_1))
+        change = rate * (order / max(ends.last.age, MIN_AGE) - 1)
+        return Pull(force, energy, scale * (sign_2 - sign_1) + force * change)
 
     # The stretch is linear in the age, so that the energy is an integral of the strength and of its moment.
     first = ends.first
     last = ends.last
-    order = law[ListLaw.ORDER]
     scale = weight / (last.age - first.age)
     slope = span / (last.age - first.age)
     offset = u_1 - slope * first.age
-    sign_1 = copysign(1.0, u_1)
-    sign_2 = copysign(1.0, u_2)
     force = sign_2 * last.integral - sign_1 * first.integral
+    change = rate * (sign_2 * last.strength - sign_1 * first.strength)
     moment = sign_2 * find_moment(last, order) - sign_1 * find_moment(first, order)
     if sign_1 != sign_2:
         middle = find_decay(max(-offset / slope, 0.0), law)
         force -= (sign_2 - sign_1) * middle.integral
         moment -= (sign_2 - sign_1) * find_moment(middle, order)
-    return Pull(scale * force, scale * (offset * force + slope * moment))
+        change -= (sign_2 - sign_1) * middle.strength * (rate - 1 / slope)
+    return Pull(scale * force, scale * (offset * force + slope * moment), scale * change)
 
 
 @njit(**NJIT_INLINE)
@@ -263,7 +273,7 @@ def slide_signs(a, b, weight, before, after, law):
 
 
 @njit(**NJIT_KERNEL)
-def pull_powers(ages, weight, stretches, law):
+def pull_powers(ages, weight, stretches, law, rate):
     """Return the `Pull` of a strip of reading = "stretch", whose bonds act with a power of their stretches.
 
     Parameters
@@ -276,28 +286,33 @@ def pull_powers(ages, weight, stretches, law):
         Stretches [m] of its ends.
     law : (k,) array
         Entries of `ListLaw`.
+    rate : float
+        Change of the damages by the slide [1/m], negative for a slide to -x.
     """
     order = law[ListLaw.ORDER]
     u_1 = stretches.first
     u_2 = stretches.last
     if u_1 == u_2:
-        return Pull(0.0, 0.0)  # a path within round-off has formed no bonds
+        return Pull(0.0, 0.0, 0.0)  # a path within round-off has formed no bonds
     spread = ages.last - ages.first
-    rate = spread / (u_2 - u_1)
+    gradient = spread / (u_2 - u_1)
 
     # Bonds that are equally damaged, or whose power exceeds the table
-    if spread <= MIN_SPREAD or rate * u_1 < law[ListLaw.TABLE]:
-        power_1 = power(abs(u_1), order) * abs(u_1)
-        power_2 = power(abs(u_2), order) * abs(u_2)
+    if spread <= MIN_SPREAD or gradient * u_1 < law[ListLaw.TABLE]:
+        power_1 = copysign(power(abs(u_1), order), u_1)
+        power_2 = copysign(power(abs(u_2), order), u_2)
         scale = weight * law[ListLaw.INVERSE_GAMMA] * fast_exp(-0.5 * (ages.first + ages.last))
         scale /= (u_2 - u_1) * (order + 1)
-        energy = (power_2 * u_2 - power_1 * u_1) / (order + 2)
-        return Pull(scale * (power_2 - power_1), scale * energy)
+        force = scale * (power_2 * u_2 - power_1 * u_1)
+        energy = scale * (power_2 * u_2 * u_2 - power_1 * u_1 * u_1) / (order + 2)
+        return Pull(force, energy, scale * (order + 1) * (power_2 - power_1) - rate * force)
 
-    # The damage is linear in the stretch, so that both are integrals over rate times stretch.
-    first = find_decay(rate * u_1, law)
-    last = find_decay(rate * u_2, law)
-    scale = weight / spread * fast_exp(first.age - ages.first) / power(abs(rate), order)
+    # The damage is linear in the stretch, so that both are integrals over its gradient times the stretch.
+    first = find_decay(gradient * u_1, law)
+    last = find_decay(gradient * u_2, law)
+    scale = weight / spread * fast_exp(first.age - ages.first) / power(abs(gradient), order)
     change = last.integral - first.integral
     energy = change - (last.age * last.strength - first.age * first.strength) / (order + 1)
-    return Pull(scale * change * copysign(1.0, rate), scale * energy / abs(rate))
+    force = scale * change * copysign(1.0, gradient)
+    slope = scale * abs(gradient) * (last.strength - first.strength) + (gradient - rate) * force
+    return Pull(force, scale * energy / abs(gradient), slope)
