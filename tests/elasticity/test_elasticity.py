@@ -104,7 +104,7 @@ def test_refuses_moduli_of_coating_and_substrate_too_far_apart():
     assert pieces[1].factor and 1e-7 < pieces[1].round_off_error < 1e-2
 
 
-def test_exact_parallelogram_has_the_stiffness_of_the_integration_at_its_points():
+def test_parallelogram_has_the_stiffness_of_the_integration_at_its_points():
     """A parallelogram has the same stiffness among other parallelograms as beside a cell without parallel sides."""
     points = np.array(
         [[0.0, 0.0], [3e-3, 1e-4], [3.5e-3, 4e-4], [5e-4, 3e-4], [6e-3, 1e-4], [6.1e-3, 9e-4]]

@@ -104,12 +104,12 @@ def write_meshes(folder) -> None:
 
 
 MESH_FAULTS = [
-    ("mm.vtu", (), 'contact.mesh: length 0.0127 m in the scene, but 12.7 m in the lower piece of the mesh: set '
+    ("mm.vtu", (), 'contact.mesh: length 12.7 mm in the scene, but 12.7 m in the lower piece of the mesh: set '
                    'contact.mesh_unit = "mm"'),
-    ("m.vtu", ("contact.mesh_unit=mm",), 'contact.mesh: length 0.0127 m in the scene, but 12.7 um in the lower piece of '
+    ("m.vtu", ("contact.mesh_unit=mm",), 'contact.mesh: length 12.7 mm in the scene, but 12.7 um in the lower piece of '
                                          'the mesh: set contact.mesh_unit = "m"'),
     ("mm.vtu", ("contact.mesh_unit=mm", "contact.height=6 mm"),
-     "contact.height: 0.006 m in the scene, but 0.00635 m in the lower piece of the mesh"),
+     "contact.height: 6 mm in the scene, but 6.35 mm in the lower piece of the mesh"),
     ("m.vtu", ("contact.mesh_unit=furlong",), "contact.mesh_unit: unknown value 'furlong'; use one of m, km, cm, mm"),
 ]  # fmt: skip
 

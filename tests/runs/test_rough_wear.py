@@ -145,7 +145,7 @@ def test_exact_split_trace_and_scan_give_the_heights(folder):
         assert 0 < measures["touching_fraction"].value < 1
 
 
-def test_exact_run_continues_and_compares(folder, tmp_path):
+def test_run_continues_and_compares(folder, tmp_path):
     """Two halves of a run agree with the whole, and `compare` gives the mean depth between them."""
     text = PATCH + TILT + LAYER + HARD + FILE + MOTION + TOLERANCE.format(1e-2)
     (folder / "scene.toml").write_text(text)

@@ -82,7 +82,7 @@ def test_common_error_of_depths_widens_the_interval():
     assert added / abs(moved.value - plain.value) == pytest.approx(1.96, rel=0.05)
 
 
-def test_exact_gain_error_widens_the_interval():
+def test_gain_error_widens_the_interval():
     """A standard deviation of the gain moves the coefficient as depths that are larger by this factor do."""
     measured = measure_depth(0.7)._replace(datum_error=0.0)
     plain, moved, wide = (

@@ -100,7 +100,7 @@ def springs():
     return press
 
 
-def test_exact_jumps_of_rough_layer_keep_the_volume_and_follow_small_explicit_steps(springs):
+def test_jumps_of_rough_layer_keep_the_volume_and_follow_small_explicit_steps(springs):
     """The worn volume is rate times load to round-off, and the depths are those of 20 000 explicit steps."""
     heights = draw_heights("gaussian")
     layer = make_rough_layer(heights, HARDNESS, 0.03 * HARDNESS, 0.5)
