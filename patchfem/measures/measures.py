@@ -129,7 +129,7 @@ def observe_stick(window: Response, omega: float) -> tuple[np.ndarray, float]:
     """Return sums (4,) over the stick of an interface for `motion_measures.measure_stick`, and their time span [s].
 
     The irreversible part of the motion is known at the midpoints of the steps, and is linear in between. A step at rest
-    counts as one without slip.
+    counts as one without slip. `motion_measures` names the other two observers and the rule of stick.
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
 """Columns of sweep.csv, in their order.
 
-In: the `SweepTable` of a sweep. Out: sweep.csv, with a row for each case. A new column is a row of `list_columns`. What it
-shows of a case is in the table (`SweepTable.insert`); a text that the files of cases do not store yet is added to
-`STORED_TEXTS` of `runs.batch.case_results`, and is then in `SweepTable.texts`.
+In: the `SweepTable` of a sweep. Out: sweep.csv, with a row for each case. A new column is a row of `list_columns`. It shows
+what the table holds of a case (`SweepTable.insert`). A text that is not stored yet is added to `STORED_TEXTS` of
+`runs.batch.case_results`, and is then in `SweepTable.texts`. A number that is not in the table yet is also stored in the
+chunks (`export.sweeps.folder`), because the rows of an interrupted sweep are made from them.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

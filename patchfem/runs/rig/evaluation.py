@@ -155,7 +155,7 @@ def replace_output_by_gauge(model, solution: Solution) -> Solution:
     # The errors of the motion grow with its size.
     run = solution.run
     window = see(run.window)
-    # A release has no gauge apart from the output.
+    # The drive is no release here: a release has no gauge apart from the output.
     extremes = find_extremes(window.time, window.output, window.output_rate)
     amplitude = measure_amplitude(np.array(extremes))
     ratio = max(1.0, amplitude / max(solution.values[AMPLITUDE], 1e-300))
