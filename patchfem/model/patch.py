@@ -470,14 +470,15 @@ def _build_loading(contact: Contact) -> PatchLoading:
     """Build the loading that a table [contact] describes."""
     line = contact.load_line
     holder = contact.holder
+    stiffness = None if holder is None else holder.rotational_stiffness
     return PatchLoading(
         load=contact.load,
         approach=contact.approach.distance if contact.approach is not None else None,
         offset=line.offset if line is not None else None,
         line_moment=line.moment if line is not None else None,
         can_rotate=line is not None and (line.offset is not None or line.moment is not None),
-        rotational_stiffness=(holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
-        tangential_stiffness=(holder.tangential_stiffness or None) if holder is not None else None,
+        rotational_stiffness=0.0 if stiffness is None else stiffness,
+        tangential_stiffness=None if holder is None else holder.tangential_stiffness,
         across=line.across if line is not None else None,
     )
 

@@ -128,3 +128,14 @@ def test_exact_holders_of_a_group_are_those_of_each_case(springs):
         for name in ("load", "approach", "moment", "spring"):
             found, expected = getattr(holders, name)[case], getattr(alone, name)[0]
             assert found == expected or (np.isnan(found) and np.isnan(expected)), name
+
+
+def test_always_sweep_over_a_holder_runs_without_notes_of_faults(capsys):
+    """Patches that differ in tilt and in the stiffness of their holder are solved together."""
+    over = {
+        "contact.tilt.angle": ["10 urad", "100 urad"],
+        "contact.holder.rotational_stiffness": ["100 N m/rad", "3000 N m/rad"],
+    }
+    found = pf.sweep(pf.new("patch"), over)
+    assert "internal fault" not in capsys.readouterr().err
+    assert (found["outcome"] == found["outcome"].values.flat[0]).all()
