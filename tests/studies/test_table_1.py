@@ -1,5 +1,6 @@
 """Table 1: scores of models without fitted parameters and of the second load path."""
 
+import numpy as np
 import pytest
 from study_module import load_study
 
@@ -28,10 +29,15 @@ def check_scores(scores, expected, within=0.0011):
     ],
 )
 def test_table_1_fit_of_the_second_path_at_143_hz(point, wanted, values):
-    """From 8 random starts, the fit reaches the optimum of an independent program."""
+    """From 8 random starts, the fit reaches the optimum of an independent program.
+
+    The readings are computed to the tolerance .001, which moves the minimum by up to a hundredth of the half-width of the
+    95 % interval; the values agree within a fiftieth of it.
+    """
     fit = load_study("table_1/second_path.py").fit_path(point)
     check_scores(fit.comparison.compute_scores(fit), wanted)
-    assert fit.fit.values == pytest.approx(values, rel=2e-3)
+    half_widths = np.diff(fit.fit.intervals.ends)[:, 0] / 2
+    assert (np.abs(fit.fit.values - values) < half_widths / 50).all()
 
 
 def test_table_1_scores_of_the_rigid_coulomb_block():
