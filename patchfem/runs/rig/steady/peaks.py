@@ -93,11 +93,11 @@ def refine_peak(points: list[CurvePoint], finder, tolerance: float) -> RefinedPe
         return RefinedPeak(curve.points, best, np.inf, np.inf)
 
     # The curve falls from the peak to its neighbours by at least as much as it rises to a peak between them. Of a smooth
-    # peak the rise follows from the shift, as it is known at the distance of the width.
+    # peak the rise follows from the shift, as it is known at the distance of the width; to a kink the curve rises linearly.
     shift = shifts.get(curve.positions[best]) or curve.find_widest_shift(best)
     above = float(np.ptp(near)) if near.size == 3 else 0.0
-    rise = (1 / WIDTH_HEIGHT_FRACTION - 1) * height
-    above = min(above, rise * (shift.distance / shift.width) ** 2)
+    rise = (1 / WIDTH_HEIGHT_FRACTION - 1) * height * (shift.distance / shift.width) ** 2
+    above = min(above, rise + curve.measure_kink(best) * shift.distance)
     return RefinedPeak(curve.points, best, above, curve.convert_to_frequency(best, shift.distance))
 
 
@@ -139,6 +139,28 @@ class CurveInProgress:
         x = np.array(self.positions)
         distance = max_abs(x[max(k - 1, 0) : k + 2] - x[k])
         return PeakShift(self.positions[k], distance, distance or 1.0)
+
+    def measure_kink(self, k: int) -> float:
+        """Return the difference of the slopes [m] of the curve on both sides of the point `k`; 0 at an end of the curve.
+
+        The slope of each side is extrapolated to the point from the two steps there.
+        """
+        slopes = []
+        for side in (slice(max(k - 2, 0), k + 1), slice(k, k + 3)):
+            x = np.array(self.positions[side])
+            y = collect_amplitudes(self.points[side])
+            middles = (x[1:] + x[:-1]) / 2
+            found = np.diff(y) / np.diff(x)
+            if not found.size:
+                return 0.0
+            # The step beside the point comes first
+            order = np.argsort(np.abs(middles - self.positions[k]))
+            slope = found[order[0]]
+            if found.size == 2 and np.isfinite(found).all():
+                line = np.diff(found[order])[0] / np.diff(middles[order])[0]
+                slope += line * (self.positions[k] - middles[order[0]])
+            slopes.append(slope)
+        return float(abs(slopes[0] - slopes[1]))
 
     def convert_to_frequency(self, k: int, distance: float) -> float:
         """Return the change of the frequency [Hz] over a distance along the curve from the point `k`."""
