@@ -63,6 +63,19 @@ def test_peak_of_sweep_case_agrees_with_drawn_curve():
         assert_peak_agrees(pf.load(scene, **values, **law))
 
 
+def test_exact_peak_at_a_kink_of_the_curve():
+    """The curve of a damper bends at its peak, near a point of a sweep; the error contains the linear rise to the kink.
+
+    The reference is the highest of nine sine motions around the kink, 0.5 mHz apart.
+    """
+    text = read_template("damper")
+    scene = text[: text.index("\n[sweep]")] + text[text.index("\n[accuracy]") :]
+    cases = pf.run_many(pf.load(scene, **{"structure.interface[1].load": "382.608 N"}))
+    amplitude, error = (part[MAIN_MEASURES[0]][0] for part in (cases.values, cases.errors))
+    reference = 162.15249e-6
+    assert amplitude < reference and abs(amplitude - reference) < error < 1e-4 * reference
+
+
 @pytest.mark.parametrize("load, frequency", [("264 N", 380.7), ("272 N", 384.6)])
 def test_highest_of_two_maxima_is_found(load, frequency):
     """Near its optimum a damper with the law of Iwan has two maxima; neither run nor sweep takes the lower one.

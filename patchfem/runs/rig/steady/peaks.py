@@ -143,24 +143,25 @@ class CurveInProgress:
     def measure_kink(self, k: int) -> float:
         """Return the difference of the slopes [m] of the curve on both sides of the point `k`; 0 at an end of the curve.
 
-        The slope of each side is extrapolated to the point from the two steps there.
+        The slopes are those of parabolas through the inverse squares of the amplitudes of the point and the next two on its
+        side, which are exact for a linear resonance. A side with one further point has the curvature of the other side.
         """
-        slopes = []
-        for side in (slice(max(k - 2, 0), k + 1), slice(k, k + 3)):
-            x = np.array(self.positions[side])
-            y = collect_amplitudes(self.points[side])
-            middles = (x[1:] + x[:-1]) / 2
-            found = np.diff(y) / np.diff(x)
-            if not found.size:
-                return 0.0
-            # The step beside the point comes first
-            order = np.argsort(np.abs(middles - self.positions[k]))
-            slope = found[order[0]]
-            if found.size == 2 and np.isfinite(found).all():
-                line = np.diff(found[order])[0] / np.diff(middles[order])[0]
-                slope += line * (self.positions[k] - middles[order[0]])
-            slopes.append(slope)
-        return float(abs(slopes[0] - slopes[1]))
+        if k in (0, len(self.points) - 1):
+            return 0.0
+        height = self.points[k].values[AMPLITUDE]
+        squares = (height / collect_amplitudes(self.points)) ** 2 - 1
+        distance = np.array(self.positions) - self.positions[k]
+        slopes = np.zeros(2)
+        bends = np.full(2, np.nan)
+        places = np.zeros(2)
+        for i, side in enumerate((-1, 1)):
+            places[i] = distance[k + side]
+            slopes[i] = squares[k + side] / places[i]
+            if 0 <= k + 2 * side < len(self.points):
+                far = k + 2 * side
+                bends[i] = (squares[far] / distance[far] - slopes[i]) / (distance[far] - places[i])
+        bends = np.where(np.isnan(bends), np.nan_to_num(bends[::-1]), bends)
+        return float(height / 2 * abs(np.diff(slopes - bends * places)[0]))
 
     def convert_to_frequency(self, k: int, distance: float) -> float:
         """Return the change of the frequency [Hz] over a distance along the curve from the point `k`."""
