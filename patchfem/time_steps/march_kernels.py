@@ -773,12 +773,13 @@ def find_event(system, level, drive):
     if is_found and not is_last:
         return True
 
-    # Ports that creep stop with the port that has reversed, because one motion of the modes may move both.
+    # Ports that creep stop with the port that has reversed, because one motion of the modes may move both. The forces that
+    # hold all ports at rest are known after the step.
     for block in range(points.blocks.law.size if is_found else 0):
         speed = points.memory[block, 0] * moves[Port.END_VELOCITY, points.blocks.port[block]]
         if points.blocks.law[block] == Law.COULOMB and speed < find_creep(system, block):
             points.trial[block, 0] = 0.0
-    return is_any_held and release_port(system, drive, is_last)
+    return is_any_held and not is_found and release_port(system, drive, is_last)
 
 
 @njit(**NJIT_CALL)
