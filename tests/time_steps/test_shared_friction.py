@@ -1,0 +1,58 @@
+"""Rigid friction at more interfaces than the modes can move apart: such interfaces share their forces, stop and turn together."""
+
+import numpy as np
+import pytest
+from march_contacts import make_contact, make_coulomb
+
+from patchfem.core import ModalBasis
+from patchfem.motion_measures import energy_balance
+from patchfem.structure.drives import RecordedDrive
+from patchfem.time_steps import laws, march
+
+N_FACES = 8
+
+
+def make_block(seed, n_rows):
+    """Return a block that slides and turns on a row of faces, its random drive of `n_rows` rows, and the friction limits."""
+    rng = np.random.default_rng(seed)
+    arms = np.linspace(-1, 1, N_FACES) * rng.uniform(0.1, 1)
+    modes = ModalBasis(
+        ("slide", "turn"),
+        np.array([1.0, rng.uniform(0.5, 1.5)]),
+        np.full(2, 0.003),
+        np.array([1.0, 0.0]),
+        np.array([1.0, rng.uniform(0.05, 0.5)]),
+        np.array([0.0, 1.0]),
+        1.0,
+        None,
+        np.stack([np.ones(N_FACES), arms], axis=1),
+    )
+    frequency = np.fft.rfftfreq(n_rows, 0.3)
+    lines = rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size)
+    base = np.fft.irfft(lines * ((frequency > 0.02) & (frequency < 0.5)), n_rows)
+    base /= base.std()
+    base[0] = 0.0
+    drive = RecordedDrive(np.arange(n_rows) * 0.3, base, 6.0)
+    limits = rng.uniform(0.8, 1.2, N_FACES) / N_FACES * rng.uniform(0.3, 1)
+    return modes, drive, limits
+
+
+@pytest.mark.parametrize("seed", [5, 7, 9, 11])
+def test_always_shared_friction_balances_energy(seed):
+    """Faces that nearly rest stop, turn back and slip again; the motion goes on to the end of the drive."""
+    modes, drive, limits = make_block(seed, 2000)
+    contact = make_contact([make_coulomb(limit, limit) for limit in limits], modes.interfaces)
+    result = march(modes, drive, contact, 99, 20)
+    assert result.outcome is None, result.message
+    assert energy_balance(result.ledger) <= 1e-9
+    forces = np.abs(result.response.extra["forces"]).max(axis=0)
+    assert (forces <= limits * (1 + 1e-9)).all()
+
+
+def test_shared_friction_is_the_limit_of_stiff_springs():
+    """The motion on rigid faces is that on stiff elastic-plastic ones, whose elastic length is 1e-5 of the motion."""
+    modes, drive, limits = make_block(11, 400)
+    rigid = make_contact([make_coulomb(limit, limit) for limit in limits], modes.interfaces)
+    stiff = make_contact([laws.make_cells(limit, 1e-5, 1.0) for limit in limits], modes.interfaces)
+    motions = [march(modes, drive, contact, 19, 160).response.output for contact in (rigid, stiff)]
+    assert np.abs(motions[0] - motions[1]).max() < 1e-3 * np.abs(motions[0]).max()
