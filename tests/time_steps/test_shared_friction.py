@@ -1,4 +1,4 @@
-"""Rigid friction at more interfaces than the modes can move apart: such interfaces share their forces, stop and turn together."""
+"""Rigid friction at more interfaces than the modes can move apart: such interfaces share their forces, and stop together."""
 
 import numpy as np
 import pytest
