@@ -78,9 +78,6 @@ LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
 # compliance of ports that share a force (`systems.REDUNDANT`)
 CREEP = 1e-7
-# Sweeps of the balance of rigid friction on ports that share their forces, and change of its forces relative to the limits
-MAX_SWEEPS = 1000
-BALANCED = 1e-12
 TINY = 1e-150  # m, in place of no path; its square is not zero
 
 
@@ -759,12 +756,11 @@ def find_event(system, level, drive):
     duration = system.options.step / (1 << level)
     is_last = is_shortest(system, level)
     is_found = False
-    is_any_held = is_shared = False
+    is_any_held = False
     for block in range(points.blocks.law.size):
         if points.blocks.law[block] != Law.COULOMB:
             continue
         p = points.blocks.port[block]
-        is_shared = is_shared or system.ports.redundant[p] > 0
         direction = points.memory[block, 0]
         is_any_held = is_any_held or direction == 0
 
@@ -777,21 +773,13 @@ def find_event(system, level, drive):
     if is_found and not is_last:
         return True
 
-    released = find_release(system, drive) if is_any_held and not is_found else -1
-    if not is_last or not (is_found or released >= 0):
-        return released >= 0
-
-    # The shortest step changes the regimes. A port that shares its force may have to stop with others, or to turn back.
-    if released >= 0:
-        points.trial[points.blocks.first[released], 0] = np.sign(moves[Port.HOLD, released])
-    elif is_shared:
-        balance_friction(system, level)
-    else:
-        for block in range(points.blocks.law.size):
-            speed = points.memory[block, 0] * moves[Port.END_VELOCITY, points.blocks.port[block]]
-            if points.blocks.law[block] == Law.COULOMB and speed < 0:
-                points.trial[block, 0] = 0.0
-    return False
+    # Ports that creep stop with the port that has reversed, because one motion of the modes may move both. The forces that
+    # hold all ports at rest are known after the step.
+    for block in range(points.blocks.law.size if is_found else 0):
+        speed = points.memory[block, 0] * moves[Port.END_VELOCITY, points.blocks.port[block]]
+        if points.blocks.law[block] == Law.COULOMB and speed < find_creep(system, block):
+            points.trial[block, 0] = 0.0
+    return is_any_held and not is_found and release_port(system, drive, is_last)
 
 
 @njit(**NJIT_CALL)
@@ -825,8 +813,10 @@ def find_creep(system, block):
 
 
 @njit(**NJIT_CALL)
-def find_release(system, drive):
-    """Return the port at rest whose holding force exceeds its limit by the largest ratio at the end of a trial step, or -1.
+def release_port(system, drive, is_last):
+    """Return whether a port at rest is released in the trial step, which can then be halved; the shortest step releases it.
+
+    Of the ports whose holding force exceeds its limit, that with the largest ratio is released.
 
     Parameters
     ----------
@@ -834,6 +824,8 @@ def find_release(system, drive):
         Arrays of the march, changed in place.
     drive : float
         Drive at the end of the step [m s-2].
+    is_last : bool
+        Whether the step cannot be halved.
     """
     points = system.points
     ports = system.ports
@@ -858,56 +850,11 @@ def find_release(system, drive):
         if hold > largest * limit:
             worst = p
             largest = hold / limit if limit > 0 else np.inf
-    return worst
-
-
-@njit(**NJIT_CALL)
-def balance_friction(system, level):
-    """Choose the regimes of rigid points on ports that share their forces, as the next shortest step asks for.
-
-    The forces F and the velocities v = u - G F at the end of this step agree if each port has v = 0 and a force within its
-    limit, or the limit and a velocity in its direction. Coordinate descent finds them: it minimizes F G F/2 - u F within
-    the limits.
-
-    Parameters
-    ----------
-    system : march_rows_kernels.System
-        Arrays of the march; the regimes are written to the memories of the trial step.
-    level : int
-        Level of the step.
-    """
-    points = system.points
-    moves = system.ports.values
-    compliance = system.ports.compliance[level, 1]
-    n_ports = moves.shape[1]
-    forces = system.ports.newton.residual
-    for p in range(n_ports):
-        forces[p] = moves[Port.FORCE, p]
-    for _ in range(MAX_SWEEPS):
-        change = largest = 0.0
-        for block in range(points.blocks.law.size):
-            if points.blocks.law[block] != Law.COULOMB:
-                continue
-            p = points.blocks.port[block]
-            v = moves[Port.END_VELOCITY, p] + moves[Port.FREE_VELOCITY, p] - moves[Port.VELOCITY, p]
-            for k in range(n_ports):
-                v -= compliance[p, k] * forces[k]
-            force = forces[p] + v / compliance[p, p]
-            limit = find_limit(points, block, force)
-            bounded = min(max(force, -limit), limit)
-            points.trial[block, 0] = np.sign(force) if abs(force) >= limit else 0.0
-            change = max(change, abs(bounded - forces[p]))
-            largest = max(largest, limit)
-            forces[p] = bounded
-        if change <= BALANCED * largest:
-            return
-
-
-@njit(**NJIT_CALL)
-def find_limit(points, block, force):
-    """Return the largest friction [N] of the rigid point of a block at the end of a step, in the direction of a force."""
-    load = pick_load(points.values[block], Value.END_LOAD, force)
-    return points.numbers[block, 0 if points.memory[block, 0] == 0 else WIDTH] * load
+    if worst < 0:
+        return False
+    if is_last:
+        points.trial[points.blocks.first[worst], 0] = np.sign(ports.values[Port.HOLD, worst])
+    return not is_last
 
 
 @njit(**NJIT_CALL)
