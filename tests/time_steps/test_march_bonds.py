@@ -111,6 +111,30 @@ def test_always_sudden_slip_dissipates_energy():
     check_balance(found, path)
 
 
+@pytest.mark.parametrize(
+    ("slip_growth", "peak", "area"),
+    [(3e-8, 46.990, 4.0979e-7), (1e-6, 46.96192, 2.98150e-7), (2e-8, 45.237, 4.3603e-4)],
+    ids=["creeps", "hardly weakens", "slips suddenly"],
+)
+def test_steeply_weakening_bonds_follow_the_first_solution(slip_growth, peak, area):
+    """Bonds of order 0 behind a soft spring creep or slip suddenly as a brute-force integration does.
+
+    The references have a strip for each of 4000 or 1000 steps per cycle. Their slide continues that of the last step, up to
+    the first change of sign of the residual; a sudden slip advances by 0.05 bond lengths at a time.
+    """
+    length = 0.3392e-6
+    law = Bonds(0.721, length, 0.0, "stretch", 0.1517 / 0.721, 0.05, slip_growth, 1e-5, 0.1679)
+    shear = make_shear(np.ones((1, 1)), [3.862e6])
+    n_steps = 1024
+    path = 12.16e-6 * np.sin(2 * np.pi * np.arange(2 * n_steps + 1) / n_steps)
+    found = follow_path(make_lists(law, [234.5], shear, 30.0), path, 1 / (162.4 * n_steps))
+    force = found.forces[:, 0]
+    loop = np.sum((0.5 * (force[1:] + force[:-1]) * np.diff(path))[-n_steps:])
+    assert found.n_unsolved == 0
+    assert np.abs(force).max() == pytest.approx(peak, rel=1e-3)
+    assert loop == pytest.approx(area, rel=1e-3)
+
+
 # ---- motion
 
 

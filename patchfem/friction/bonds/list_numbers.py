@@ -10,7 +10,7 @@ from .strip_rows_kernels import (
     MAX_NEW_STRIPS,
     N_CELLS_PER_AGE,
     N_COEFFICIENTS,
-    N_STRIP_ENTRIES,
+    N_ROW_ENTRIES,
     BondLists,
     ListLaw,
     ListState,
@@ -103,13 +103,16 @@ def make_lists(bonds: Bonds, reach: float, merge: float, loads) -> BondLists:
     capacity = N_UNMERGED_STRIPS // loads.size + MAX_STRIPS
     if merge:
         capacity = min(ceil(STRIPS_PER_WIDTH / merge), MAX_STRIPS)
-    strips = np.zeros((loads.size, capacity + MAX_NEW_STRIPS, N_STRIP_ENTRIES))
+    strips = np.zeros((loads.size, capacity + MAX_NEW_STRIPS, N_ROW_ENTRIES))
     # Half the stretch [bond lengths] over which the initial bonds are distributed, so that their
     # force has no jump
     half = 1e-6 * bonds.length
     unit = bonds.length**bonds.order if is_stretch else 1.0
+    # Age, strength and integral of bonds that have not moved
+    decay = (0.0, float(bonds.order == 0), 0.0)
     for point, load in enumerate(loads):
-        strips[point, 0] = Strip(-half, half, 0.0, 0.0, 0.0, bonds.initial * load / unit, 0.0, 0.0)
+        strip = Strip(-half, half, 0.0, 0.0, 0.0, bonds.initial * load / unit, 0.0, 0.0)
+        strips[point, 0] = (*strip, *decay, *decay)
     states = np.zeros((loads.size, len(ListState)))
     states[:, ListState.COUNT] = float(bonds.initial > 0)
     states[:, ListState.LENGTH] = bonds.length

@@ -25,7 +25,7 @@ class Joint(NamedTuple):
 
 @njit(**NJIT_KERNEL)
 def read_strip(strips, k):
-    """Return the `Strip` of number k in the array `strips` (capacity, 8)."""
+    """Return the `Strip` of number k in the array `strips` (capacity, 14)."""
     row = strips[k]
     return Strip(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7])
 
@@ -36,7 +36,7 @@ def write_strip(strips, k, strip):
 
     Parameters
     ----------
-    strips : (capacity, 8) array
+    strips : (capacity, 14) array
         List, changed in place.
     k : int
         Number of the strip.
@@ -55,7 +55,7 @@ def join_strips(strips, state, law, error):
 
     Parameters
     ----------
-    strips : (capacity, 8) array
+    strips : (capacity, 14) array
         Strips of a point, changed in place.
     state : (9,) array
         Entries of `ListState`, changed in place.

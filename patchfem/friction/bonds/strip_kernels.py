@@ -9,14 +9,15 @@ from typing import NamedTuple
 
 from ...kernel_cache.flags_kernels import NJIT_KERNEL
 from ...kernel_cache.jit import njit
-from .decay_kernels import average_strength, find_moment
+from .decay_kernels import Decay, average_strength, find_moment
 from .list_math_kernels import power
 from .point_kernels import grow
 from .strip_join_kernels import join_strips, read_strip, write_strip
-from .strip_rows_kernels import MAX_NEW_STRIPS, ListLaw, ListState, Strip
+from .strip_rows_kernels import MAX_NEW_STRIPS, N_STRIP_ENTRIES, ListLaw, ListState, Strip
 from .strip_sum_kernels import (
     GAUSS,
     MIN_BOND_RATIO,
+    Ends,
     Moved,
     Stretches,
     find_ages,
@@ -250,7 +251,33 @@ def pull_new_strips(state, law, increment):
 
 
 @njit(**NJIT_KERNEL)
-def slide_strip(strip, law, increment, ends):
+def read_ends(strips, k):
+    """Return the `Ends` of the strip of number k before the next increment, from the array `strips` (capacity, 14)."""
+    row = strips[k]
+    i = N_STRIP_ENTRIES
+    return Ends(Decay(row[i], row[i + 1], row[i + 2]), Decay(row[i + 3], row[i + 4], row[i + 5]))
+
+
+@njit(**NJIT_KERNEL)
+def write_ends(strips, k, ends):
+    """Write the `Ends` of a strip before the next increment to a list.
+
+    Parameters
+    ----------
+    strips : (capacity, 14) array
+        List, changed in place.
+    k : int
+        Number of the strip.
+    ends : Ends
+        Decay of its first and of its last bonds.
+    """
+    for i in range(3):
+        strips[k, N_STRIP_ENTRIES + i] = ends.first[i]
+        strips[k, N_STRIP_ENTRIES + 3 + i] = ends.last[i]
+
+
+@njit(**NJIT_KERNEL)
+def slide_strip(strip, law, increment, start, ends):
     """Return the mean force [N] over mu_s of a `Strip` over an increment.
 
     Parameters
@@ -261,8 +288,8 @@ def slide_strip(strip, law, increment, ends):
         Entries of `ListLaw`.
     increment : Increment
         Increment of the list.
-    ends : Ends
-        Ends of the strip after the increment; not used if its bonds act with powers of their stretches.
+    start, ends : Ends
+        Ends of the strip before and after the increment; not used if its bonds act with powers of their stretches.
     """
     # The force is smooth between the instants at which the stretches of the ends vanish. The ages of mature bonds are
     # linear, so that their mean is exact.
@@ -271,17 +298,22 @@ def slide_strip(strip, law, increment, ends):
     last = find_passage(strip.stretch_2, increment.slide)
     mean = 0.0
     low = 0.0
+    before = start
+    place = 0.0  # fraction of the increment to which `before` belongs
     for high in (min(first, last), max(first, last), 1.0):
         middle = min(max(grown, low), high)
         if middle > low:
             mean += (middle - low) * average_pull(strip, law, increment, low, middle)
         if high > middle:
-            before = find_ends(strip, law, move(increment, middle))
+            if middle > place:
+                before = find_ends(strip, law, move(increment, middle))
             after = ends if high == 1.0 else find_ends(strip, law, move(increment, high))
-            start = find_stretches(strip, middle * increment.slide)
+            begin = find_stretches(strip, middle * increment.slide)
             stop = find_stretches(strip, high * increment.slide)
-            force = slide_signs(before, after, strip.weight, start, stop, law)
+            force = slide_signs(before, after, strip.weight, begin, stop, law)
             mean += (high - middle) * force
+            before = after
+            place = high
         low = high
     return mean
 
@@ -439,7 +471,7 @@ def slide_list(bonds, slide, v_0, v_1, dt):
             pull = pull_signs(ends, strip.weight, find_stretches(strip, probe), law, rate)
         end += pull.force
         slope += pull.slope
-        mean += slide_strip(strip, law, increment, ends)
+        mean += slide_strip(strip, law, increment, read_ends(strips, k), ends)
     # Bonds that grow change the force without a slide too.
     mean_slope = 0.5 * slope if increment.growth > 0 else (end - mean) / probe
     change = slide - probe
@@ -501,8 +533,16 @@ def advance_list(bonds, slide, v_0, v_1, dt):
     still = Moved(0.0, 0.0, 1.0, moved.length)
     force = 0.0
     energy = 0.0
+    has_powers = law[ListLaw.IS_STRETCH] * law[ListLaw.ORDER] != 0.0
     for k in range(int(state[ListState.COUNT])):
-        pull = pull_strip(read_strip(strips, k), law, still, 1.0)
+        strip = read_strip(strips, k)
+        if has_powers:
+            pull = pull_strip(strip, law, still, 1.0)
+        else:
+            ends = find_ends(strip, law, still)
+            rate = find_rate(law, still, 1.0)
+            pull = pull_signs(ends, strip.weight, find_stretches(strip, 0.0), law, rate)
+            write_ends(strips, k, ends)
         force += pull.force
         energy += pull.energy
     state[ListState.FORCE] = force

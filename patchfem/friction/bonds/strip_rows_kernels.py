@@ -35,6 +35,9 @@ class Strip(NamedTuple):
 
 
 N_STRIP_ENTRIES = len(Strip._fields)
+# A row of a list has these entries, then age, strength and integral (`decay_kernels.Decay`) of its first and of its last
+# bonds before the next increment, for bonds that act with the signs of their stretches.
+N_ROW_ENTRIES = N_STRIP_ENTRIES + 6
 
 
 class ListState(IntEnum):
@@ -85,7 +88,7 @@ class ListLaw(IntEnum):
 class BondLists(NamedTuple):
     """Lists of the bonds of m points.
 
-    - strips: (m, capacity, 8) entries of `Strip`
+    - strips: (m, capacity, 14) entries of `Strip`, and of the decay of its ends (`N_ROW_ENTRIES`)
     - states: (m, 9) entries of `ListState`
     - law: (m, k) entries of `ListLaw`, followed by the table
     - growth: (m, 5) parameters of eq. 2.10, see `point_rows_kernels.GrowthNumbers`
@@ -100,7 +103,7 @@ class BondLists(NamedTuple):
 class BondList(NamedTuple):
     """List of the bonds of a point; the fields are those of `BondLists`.
 
-    - strips: (capacity, 8)
+    - strips: (capacity, 14)
     - state: (9,)
     - law: (k,)
     - growth: (5,)

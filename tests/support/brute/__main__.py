@@ -5,7 +5,8 @@ scene that the program accepts is run and compared with the references of the re
 file lacks, from brute force alone. A PART limits the scenes to those whose seed, kind, effect or law it is. `--shift=N`
 draws other scenes, whose seeds are higher by N; their references lie in the working folder.
 
-Shifts of campaigns: 20000 (release 3.0, both recipes), 38200 (refused combinations), 36000 (`--march`).
+Shifts of campaigns: 20000 (release 3.0, both recipes), 38200 (refused combinations), 36000 (`--march`), 50100 and 50300
+(refused combinations under the effect "load").
 """
 
 import json
