@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core import Outcome, PatchfemError
 from ..model.model import Model, build
-from ..runs.patch import mesh_levels
+from ..runs.patch import case_meshes
 from ..runs.patch.press import solve_patch_contact
 from ..scene.assignments import BOUNDS_FORM, Range, read_assignments
 from ..scene.keys.lines import find_scene_value
@@ -90,7 +90,7 @@ def solve_contact(model: Model, pair=None):
     touch.
     """
     if pair is None:
-        patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+        patch = case_meshes.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     else:
         patch = solve_patch_contact(model.patch, pair)
     if patch.pressure.outcome is Outcome.NO_CONTACT:

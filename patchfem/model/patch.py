@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from ..core import array_dataclass
 from ..mesh.ends import SHARP_END, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material, OnePiece
@@ -167,7 +169,7 @@ class PatchLoading:
     def moment(self) -> float | None:
         """Moment of the load about the middle [N m], or None if the piece cannot rotate."""
         if not self.can_rotate:
-            return 0.0 if self.rotational_stiffness > 0 else None
+            return 0.0 if np.any(np.greater(self.rotational_stiffness, 0.0)) else None
         return self.line_moment if self.line_moment is not None else self.load * self.offset
 
 

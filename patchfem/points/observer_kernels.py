@@ -372,12 +372,13 @@ def observe_motion(body, piece, seen):
         seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], slip)
         seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], slip)
 
-    # Forces of other laws have their extremes at the ends of pieces.
+    # Forces of other laws have their extremes at the ends of pieces, except the one that holds a rigid point.
     output = case[Number.OUTPUT]
     weights = 0.0, output, case[Number.BASE]
     seen[Seen.MAX_ACCELERATION] = find_peak(body, piece, weights, seen[Seen.MAX_ACCELERATION])
     law = numbers[LawNumber.LAW]
-    if law == Law.TANH or law == Law.LUGRE:
+    is_held = law == Law.COULOMB and direction == 0
+    if is_held or law == Law.TANH or law == Law.LUGRE:
         weights = 1.0, 0.0, 0.0
         seen[Seen.MAX_FORCE] = find_peak(body, piece, weights, seen[Seen.MAX_FORCE])
 

@@ -24,7 +24,7 @@ it:
 PUBLIC = {
     "findings": ("compute_accuracy_curve",),
     "batch.case_results": ("CaseResults", "FAILED_OUTCOME"),
-    "patch.mesh_levels": ("solve_with_coarser",),
+    "patch.case_meshes": ("solve_with_coarser",),
     "pieces": ("PieceFields", "PieceFrames", "compute_pieces"),
     "results.patch_rows": ("PATCH_TABLE",),
     "results.result": ("describe_measure",),

@@ -20,7 +20,7 @@ from ..model.gap import longest_loaded_cell
 from ..model.model import Model
 from ..scene.keys.contact import MAX_AREA_CELLS
 from . import refine
-from .patch import mesh_levels
+from .patch import case_meshes
 from .refine import is_main
 from .results import notes, patch_rows
 from .results.interfaces import PressedFace, merge_findings
@@ -206,7 +206,7 @@ def _advise_mesh(
     # The main measures have decided on the mesh; another measure needs a smaller tolerance.
     tolerance = PROPOSED_TOLERANCE_RATIO * missed.model.accuracy.tolerance
     is_at_limit = is_at_limit or refine.is_main(missed.worst)
-    if is_at_limit or not any(mesh_levels.needs_finer_mesh(*place, tolerance) for place in solved):
+    if is_at_limit or not any(case_meshes.needs_finer_mesh(*place, tolerance) for place in solved):
         return Advice(
             f"{cause}a finer mesh does not reduce it or is too expensive; {USE_ERROR_ADVICE}"
         )

@@ -23,7 +23,7 @@ from ..model.model import Model
 from ..model.source import Source, locate_errors
 from ..model.structure import compute_sticking_stiffness
 from ..partial_slip.edge_springs import add_edge_springs
-from .patch import faces, mesh_levels
+from .patch import case_meshes, faces
 from .patch.jenkins_elements import compute_stick_stiffness
 from .patch.press import Patch, Patches
 
@@ -98,7 +98,7 @@ def solve_patch(model: Model, solved: Patches = ()) -> Patches:
     solved : tuple
         Patches of an earlier pass, from fine to coarse, whose meshes are refined further.
     """
-    return mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, solved=solved)
+    return case_meshes.solve_with_coarser(model.patch, model.accuracy.tolerance, solved=solved)
 
 
 def find_source(model: Model) -> Source:
@@ -116,7 +116,7 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
     model : Model
         Model of a rig, whose modes may include the joint.
     patches : sequence of Patch or None
-        The patch of [contact] on its meshes, from fine to coarse (`mesh_levels.solve_with_coarser`).
+        The patch of [contact] on its meshes, from fine to coarse (`case_meshes.solve_with_coarser`).
 
     Raises
     ------

@@ -13,7 +13,9 @@ from ..core import max_abs
 from ..elasticity import coating_traction, recovery
 from ..elasticity.elasticity import compute_displacement, von_mises
 from ..formatting import format_length
-from .patch.mesh_levels import select_pair_for_stress
+from .patch.condensed import CondensedPair, condense
+from .patch.grids import is_too_expensive
+from .patch.press import Patch
 from .patch.strength import YIELDING_NEGLECTED, Strength, min_von_mises_ratio, yield_strength
 from .results.patch_rows import Arrays
 from .results.result import patch_surface
@@ -86,6 +88,20 @@ class _LoadedPiece(NamedTuple):
     def add_up_frames(self, u: np.ndarray) -> np.ndarray:
         """Return (f, ...) in each frame from the pressed state and what each load case adds to it, u (1 + d, ...)."""
         return (u[:1] + u[1:])[self.case]
+
+
+def select_pair_for_stress(patch: Patch) -> CondensedPair:
+    """Return condensed pieces on whose mesh the stress inside the pieces is computed.
+
+    They are those of the patch, unless the motion needed a finer mesh than the static measures may have. Such a mesh is
+    coarsened: it is fine because of the contact edges, and all its nodes in all frames would need gigabytes.
+    """
+    meshes = patch.pair.meshes
+    if not (patch.model.mesh.is_automatic and is_too_expensive(patch.model, meshes)):
+        return patch.pair
+    while is_too_expensive(patch.model, meshes):
+        meshes = [mesh and mesh.coarsen() for mesh in meshes]
+    return condense(patch.model, *meshes)
 
 
 def compute_pieces(result, pair=None) -> PieceFrames:

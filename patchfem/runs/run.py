@@ -20,7 +20,7 @@ from ..model.model import Model
 from ..model.source import locate_errors
 from . import joint, refine
 from .findings import find_missed_measures, mark_unbalanced
-from .patch import area_motion, faces, mesh_levels, store, strength
+from .patch import area_motion, case_meshes, faces, store, strength
 from .patch import result as patch_result
 from .plan import Plan, plan, refuse_first_case, refuse_insufficient_memory
 from .results.interfaces import PressedFace, merge_sentences
@@ -316,7 +316,7 @@ def _press_interfaces(
         return (PressedFace(0, "", model, joint.solve_patch(model, solved)),)
     tolerance = model.accuracy.tolerance
     solved = (before[0].unworn or before[0].patches) if before else ()
-    patches = mesh_levels.solve_with_coarser(model.patch, tolerance, estimate, tuple(solved))
+    patches = case_meshes.solve_with_coarser(model.patch, tolerance, estimate, tuple(solved))
     return (PressedFace(0, "", model, patches),)
 
 

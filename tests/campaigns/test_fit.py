@@ -18,7 +18,7 @@ from patchfem.core import PatchfemError
 from patchfem.export.fits import format_fitted_scene
 from patchfem.inputs import read_loop
 from patchfem.runs.bench import bench
-from patchfem.runs.patch.mesh_levels import solve_with_coarser
+from patchfem.runs.patch.case_meshes import solve_with_coarser
 from patchfem.scene import load, loads
 
 LOAD = 100.0

@@ -186,6 +186,16 @@ def test_exact_other_kinds_of_motion_run_alone(changes):
     assert_equal_case(results, 0, one_by_one.solve([model]))
 
 
+def test_exact_points_without_friction_have_no_equivalent_damping():
+    """Without friction the loop has no area, and the equivalent damping and its error are 0 as in a single run."""
+    model = pf.build(load_scene(RIG, "friction.static=0"))
+    results = batches.solve_models([model, model], n_study_cases=MANY)
+    assert results.numerics[0]["engine"] == lumped.BATCH_ENGINE
+    assert results.values["loop_area"].tolist() == [0.0, 0.0]
+    assert results.values["equivalent_damping"].tolist() == [0.0, 0.0]
+    assert results.errors["equivalent_damping"].tolist() == [0.0, 0.0]
+
+
 OUTCOMES = {  # Changes of the rig: outcome, and whether the steady amplitude is estimated.
     "structure.mode.axial.damping=0; normal.load=1 lbf": ("grows", False),
     "drive.cycles=60; structure.mode.axial.damping=0.01; normal.load=12 lbf": ("transient", True),

@@ -126,6 +126,15 @@ def test_exact_bench_agrees_with_reference(law, slide):
     assert run.ledger[2, -1] == pytest.approx(path.dissipated.sum(), abs=1e-13 * exchanged)
 
 
+@pytest.mark.parametrize("law", ["coulomb", "tanh", "elastic-plastic", "bonds"])
+def test_exact_faces_without_friction_slip_with_the_slide(law):
+    """Without friction nothing stretches: the slip is the slide, and all energies are 0."""
+    model = build_bench(ROUND_OFF_LAWS[law], "sine", "friction.static=0")
+    run = bench.run_bench(model, None, 80)
+    assert run.slip == pytest.approx(run.slide, abs=1e-18)
+    assert not run.force.any() and not run.ledger.any()
+
+
 def test_exact_velocity_under_changing_load_is_that_of_the_slide():
     """Samples that a changing load adds near those of the slide do not disturb its velocity."""
     changing = POINT + 'amplitude = "30 N"\nfrequency = "55 Hz"\n'

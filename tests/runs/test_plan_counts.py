@@ -126,6 +126,7 @@ method = "harmonic"
         ({}, "may slip near 845.9 Hz, its natural frequency while it sticks"),
         ({"drive.to": "700 Hz"}, "friction should hold the block"),
         ({"drive.to": "700 Hz", "normal.load": "7 N"}, "may slip near 845.9 Hz"),
+        ({"structure.mode.0.frequency": "0 Hz"}, "may slip near 821.9 Hz"),
     ],
 )
 def test_exact_elastic_interface_slips_near_resonance(values, words):

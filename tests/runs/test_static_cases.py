@@ -35,7 +35,7 @@ def make_group(text: str):
 def list_single_runs(group, tolerance: float = TOLERANCE) -> list:
     """Return the measures of a single run of each case."""
     runs = (
-        folder.mesh_levels.solve_with_coarser(folder.cases.take_patch(group, case), tolerance)
+        folder.case_meshes.solve_with_coarser(folder.cases.take_patch(group, case), tolerance)
         for case in range(LOADS.size)
     )
     return [patches[0].measures for patches in runs]
@@ -88,7 +88,7 @@ def test_exact_single_run_is_a_batch_of_one(extra):
     """A group with a single case has the meshes, and so the values, errors and floors, of the single run to 1e-12."""
     patch = pf.build(load_scene(BLOCK + COATING + extra)).patch
     batch = folder.case_meshes.solve_cases(patch, 1, TOLERANCE)
-    single = folder.mesh_levels.solve_with_coarser(patch, TOLERANCE)[0]
+    single = folder.case_meshes.solve_with_coarser(patch, TOLERANCE)[0]
     assert batch.facts[folder.cases.MeshFact.N_NODES, 0] == single.x.size
     for name, measure in single.measures.items():
         columns = (batch.values, batch.errors, batch.floors)

@@ -9,10 +9,11 @@ from scene_texts import COATED
 from support.pieces import compute_row_heights
 from wedges import singularity_exponent
 
-from patchfem import build
+from patchfem import build, closed_forms
 from patchfem.core import frozen_array
 from patchfem.mesh import TensorGrid
 from patchfem.model import extend_grid, make_piece_meshes
+from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.press import solve_patch_contact
 from patchfem.runs.patch.values import compute_static_values
@@ -30,6 +31,7 @@ NARROW = '[contact.{}]\nlength = "8 mm"\n'
 UPPER, LOWER = "[contact.upper]\n", "[contact.lower]\n"
 CHAMFER = 'length = "8 mm"\nchamfer = "1 mm"\n'
 TILT = '[contact.tilt]\nangle = "{}0.04 mrad"\n'
+STEP = '[contact.step]\nheight = "0.1 mm"\nat = "-3 mm"\n'
 OUTLINE = '[contact.{}]\nlength = "8 mm"\nchamfer = "0.3 mm"\n[contact.{}]\nend_radius = "1 mm"\n'
 
 
@@ -99,3 +101,21 @@ def test_exact_narrow_piece_above_or_below_gives_same_pressure():
     a, b = patches
     assert np.abs(a.pressure.sigma_n - b.pressure.sigma_n).max() <= 1e-9 * a.pressure.sigma_n.max()
     assert compute_static_values(b) == pytest.approx(compute_static_values(a), rel=1e-8)
+
+
+@pytest.mark.parametrize("radius", [1e-4, 4e-4])
+def test_exact_contact_beside_a_step_ends_on_the_rounded_end(radius):
+    """A flat part between a step and a rounded end is in contact as a whole, as the pressure of a sharp corner is unbounded.
+
+    The contact ends within the length on the rounding of a rounded punch that is as long as the flat part.
+    """
+    model = build_patch_model(BLOCK + STEP + LOWER + f'end_radius = "{radius} m"\n')
+    found = solve_with_coarser(model, 1e-2)[0].measures["contact_fraction"]
+    assert found.error <= 1e-4 * found.value
+    pieces = model.pieces
+    flat = (pieces.flat_half_length - 3e-3) / 2
+    half_width = closed_forms.contact.rounded_punch_half_width(
+        1e5, flat, radius, pieces.surface_modulus
+    )
+    beyond = found.value * pieces.length - 2 * flat
+    assert -found.error * pieces.length <= beyond <= half_width - flat

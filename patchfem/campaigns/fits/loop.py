@@ -20,8 +20,8 @@ from ...model.model import Model, build
 from ...model.source import locate_errors
 from ...runs.bench.bench import run_bench
 from ...runs.interfaces.bond_lists import choose_slide_summation
+from ...runs.patch.case_meshes import condense_for_contacts, solve_on_other_mesh
 from ...runs.patch.condensed import CondensedPair
-from ...runs.patch.mesh_levels import condense_for_contacts, solve_on_other_mesh
 from ...runs.refine import NO_LIMIT, Verdict, refine
 from ...scene.assignments import Range
 from ...scene.scene import Scene, SceneError

@@ -18,7 +18,7 @@ from ...core import Missing, NotConverged, PatchfemError
 from ...formatting import format_length
 from ...identify.intervals import IntervalKind
 from ...inputs.damage import refuse_damage
-from ...runs.patch import mesh_levels
+from ...runs.patch import case_meshes
 from ...runs.run import run
 from ...runs.wear import evolve
 from ...scene.assignments import Range
@@ -165,7 +165,7 @@ class DepthComparison(Comparison):
             )
 
         # The contact of the unworn pieces does not depend on the coefficient.
-        self.patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+        self.patch = case_meshes.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
         self.curve = self._compute_curve(high)
         self.interpolate = PchipInterpolator(*self.curve)
         self.factor = 1.0

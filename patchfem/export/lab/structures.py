@@ -14,7 +14,7 @@ from ...model.model import Model
 from ...model.rig import MAX_COMPUTED_DISPLACEMENT
 from ...model.source import locate_errors
 from ...runs.interfaces.joints import list_parts
-from ...runs.patch import mesh_levels
+from ...runs.patch import case_meshes
 from ...runs.rig import engines
 
 
@@ -121,7 +121,7 @@ def make_elements(model: Model) -> dict[str, np.ndarray]:
         return {"limit": none, "stiffness": none, "direction": np.zeros((0, modes.omega.size))}
     patch = None
     if model.patch is not None:
-        patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
+        patch = case_meshes.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
 

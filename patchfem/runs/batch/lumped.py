@@ -445,9 +445,10 @@ def estimate_exact_errors(group: Group, march: CaseMarch) -> dict[str, np.ndarra
     errors["loop_area"] += work
     for name in select_names("run"):
         errors[name] += work * march.extremes.shape[1]
+    # Without friction both are 0.
     with np.errstate(all="ignore"):
-        ratio = np.abs(values["equivalent_damping"] / values["loop_area"])
-        errors["equivalent_damping"] += ratio * work
+        damping, area = (np.abs(values[name]) for name in ("equivalent_damping", "loop_area"))
+        errors["equivalent_damping"] += ratio_or_zero(damping, area) * work
     return include_phase_error(errors)
 
 

@@ -52,7 +52,9 @@ class _Branch(NamedTuple):
         loss = self.ratio * loop.area / 4
         work = self.force * moved + self.ratio**2 * (loop.area / 8 + x * loop.force / 2)
         force = self.force + self.ratio * self.direction * loop.force
-        return np.array([force, self.direction * loss / limit, work, loss])
+        # Elements without friction slip as far as they are moved.
+        slip = self.direction * loss / limit if limit > 0 else moved
+        return np.array([force, slip, work, loss])
 
 
 def follow_masing(find_loop, limit: float, slide) -> MasingHistory:

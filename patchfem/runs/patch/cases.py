@@ -110,12 +110,6 @@ def make_cases(patch_model: PatchModel, count: int) -> Cases:
         Number n of cases.
     """
     loading = patch_model.loading
-    spring = loading.rotational_stiffness
-    moment = None
-    if loading.can_rotate:
-        moment = loading.moment
-    elif np.any(np.greater(spring, 0.0)):
-        moment = 0.0
 
     def fill(value) -> np.ndarray:
         """Return a number, or an array (n,), as an array (n,); NaN for None."""
@@ -124,8 +118,8 @@ def make_cases(patch_model: PatchModel, count: int) -> Cases:
     holders = Holders(
         fill(loading.load),
         fill(loading.approach),
-        fill(moment),
-        fill(spring),
+        fill(loading.moment),
+        fill(loading.rotational_stiffness),
     )
     # After the part that no case scales comes the change of a node at a step
     split = _split_gap(patch_model)

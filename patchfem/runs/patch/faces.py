@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ...core import PatchfemError
 from ..results.interfaces import PressedFace
-from . import mesh_levels
+from . import case_meshes
 from .press import Patches
 
 
@@ -38,7 +38,7 @@ def solve_contact_on_meshes(interface, tolerance: float) -> Patches:
         With the scene key of the interface that is in error.
     """
     try:
-        return mesh_levels.solve_with_coarser(interface.patch, tolerance)
+        return case_meshes.solve_with_coarser(interface.patch, tolerance)
     except PatchfemError as error:
         error.key = error.key and f"{interface.key}.{error.key}"
         raise

@@ -50,6 +50,9 @@ N_CELLS_PER_SLIP_ZONE = 4
 MAX_SLIP_ZONE_CELL_RATIO = 4.0
 # The same ratio for the waves of a surface.
 MAX_WAVE_CELL_RATIO = 2.0
+# Largest distance from the position of a contact edge, in cells, at which the contact may end: the position lies up to a
+# third of a cell inside the last loaded node (`contact.edges`), and the contact ends at the next node at most.
+MAX_EDGE_REACH_IN_CELLS = 4 / 3
 # Largest number of contact searches; each search uses columns graded to the result of the previous
 # one.
 MAX_CONTACT_SEARCHES = 8
@@ -274,8 +277,8 @@ def make_column_layout(patch_model, extents: list[ContactExtent]) -> Layout:
     step_cell = min_cell / EDGE_TO_GAP_STEP_CELL_RATIO
     bands += _make_point_bands(patch_model.gap.step_edges, step_cell)
 
-    # The contact on a rounded end has as many cells as a slip zone. On longer cells the contact may end one cell before it.
-    reach = max(extent.cell for extent in extents)
+    # The contact on a rounded end has as many cells as a slip zone. On longer cells the contact may end before it.
+    reach = MAX_EDGE_REACH_IN_CELLS * max(extent.cell for extent in extents)
     flat = patch_model.pieces.flat_half_length
     rounding = estimate_rounded_length(patch_model)
     for side, end in zip((-1, 1), span) if rounding else ():

@@ -14,8 +14,8 @@ from ...model.source import locate_errors
 from ...scene.keys.contact import Material
 from ..results.result import ContactData, Result, RunInputs, Statements, collect_rest_frame
 from . import skin, store
+from .case_meshes import solve_with_coarser
 from .measures import note_on_plane_state
-from .mesh_levels import solve_with_coarser
 from .values import contact_reaches_steep_end
 
 # Largest Poisson's ratio at which the error estimates are reliable despite volumetric locking.

@@ -163,7 +163,7 @@ def _find_sticking_force(rig, stiffness: float) -> tuple[float, float | None]:
     mode = rig.first_mode
     if np.isinf(stiffness):
         return inf, 1.0
-    resonance = mode.frequency * np.sqrt(1 + stiffness / mode.stiffness)
+    resonance = np.sqrt((mode.stiffness + stiffness) / mode.contact_mass) / (2 * np.pi)
     signal = rig.drive.signal
     if rig.drive.waveform.is_sine:
         ends = [1 / signal.period]

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from point_cases import DRIVES, LAWS
+from point_cases import SCENE as POINT_SCENE
 from scene_texts import (
     COATED,
     COULOMB,
@@ -19,6 +21,8 @@ from scene_texts import (
 from patchfem.campaigns import SweepScene
 from patchfem.core import PatchfemError
 from patchfem.model import SimilarModels
+from patchfem.runs.batch import lumped
+from patchfem.runs.patch.cases import make_cases, take_patch
 from patchfem.scene.overrides import PLAIN_KEYS
 
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"\n'
@@ -29,6 +33,13 @@ UNITS = {
     "acceleration": "m/s^2",
     "frequency": "Hz",
     "moving_mass": "kg",
+}
+UNITS |= {
+    "distance": "m",
+    "height": "m",
+    "offset": "m",
+    "radius": "m",
+    "rotational_stiffness": "N m/rad",
 }
 UNITS |= {"angle": "rad", "reference_speed": "m/s", "stiffness": "N/m", "stribeck_speed": "m/s"}
 KEYS = list(
@@ -225,3 +236,50 @@ def test_exact_derived_loadings_equal_those_built_from_text(name):
         sets = (f"{key}={float(value)!r} {unit}",)
         derived = derive_model(sweep_scene, sets, (float(value),))
         assert derived is not None and are_identical(derived, sweep_scene.build_model(sets)), sets
+
+
+# Scene that has each plain key, and three of its values in SI
+COLUMN_LAWS = {
+    "friction.bond_length": "elastic-plastic",
+    "friction.reference_speed": "tanh",
+    "friction.stiffness": "bouc-wen",
+    "friction.stribeck_speed": "lugre",
+}
+COLUMN_TEXTS = {
+    **{key: text for text, key, *_ in LOADINGS.values()},
+    "contact.load": TILTED,
+    "contact.tilt.angle": HELD,
+    "contact.crown.radius": TILTED + '[contact.crown]\nradius = "3 m"\n',
+}
+
+
+@pytest.mark.parametrize("key", [*PLAIN_KEYS, "contact.load_line.offset"])
+def test_exact_columns_of_a_plain_key_are_those_of_each_model(key):
+    """Numbers that are arrays over the cases give each case the numbers of its own model, to the bit."""
+    law = LAWS[COLUMN_LAWS.get(key, "coulomb")]
+    point = POINT_SCENE.format(law=law, drive=DRIVES["drive.acceleration"])
+    sweep_scene = SweepScene(Path("a.toml"), COLUMN_TEXTS.get(key, point))
+    full_key = key.replace("mode.", "mode.0.")
+    values = np.array([[1e-3], [2e-3], [4e-3]])
+    sets = [
+        (f"{full_key}={value!r} {UNITS.get(key.rpartition('.')[2], '')}".strip(),)
+        for (value,) in values.tolist()
+    ]
+    base = sweep_scene.build_similar_base((full_key,), sets[1])
+    similar = SimilarModels(*base, values, lambda case: sets[case], np.arange(3))
+    models = [sweep_scene.build_model(texts) for texts in sets]
+    if not key.startswith("contact."):
+        together, apart = lumped.collect_cases(similar), lumped.collect_cases(models)
+        assert are_identical(together, apart)
+        assert len(np.unique(np.column_stack(together.cases[:2]), axis=0)) == 3
+        return
+
+    columns = similar.columns().patch
+    cases = make_cases(columns, 3)
+    for case, model in enumerate(models):
+        assert are_identical(take_patch(columns, case), model.patch)
+        alone = make_cases(model.patch, 1)
+        assert np.array_equal(cases.take([case]).holders, alone.holders, equal_nan=True)
+        assert np.array_equal(cases.amplitudes[case], alone.amplitudes[0])
+    numbers = np.nan_to_num(np.column_stack([*cases.holders, cases.amplitudes]))
+    assert len(np.unique(numbers, axis=0)) == 3

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from patchfem.model.model import build
-from patchfem.runs.patch import mesh_levels
+from patchfem.runs.patch import case_meshes
 from patchfem.scene import loads as read_scene
 
 from .gauss_seidel import CONTACT, GROOVES, LOWER, PRESCRIBED, Loads, Points, Structure, march
@@ -464,7 +464,7 @@ def press(contact: dict) -> Pressed:
 def _press_text(text: str) -> Pressed:
     """Return the pressed pieces of a scene that has only [contact]."""
     model = build(read_scene(text))
-    patch = mesh_levels.solve_with_coarser(model.patch, 1e-3)[0]
+    patch = case_meshes.solve_with_coarser(model.patch, 1e-3)[0]
     arrays = (
         patch.x,
         patch.pieces.interface.weight,
