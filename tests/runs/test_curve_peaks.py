@@ -151,7 +151,7 @@ def test_peak_of_damper_that_hardly_slips(load):
 
 
 def assert_peak_agrees(scene):
-    """Assert that the peak of a scene without its curve is that of the drawn curve within both errors; return its amplitude."""
+    """Assert that the peak of a scene without its curve is that of the drawn curve, and return its amplitude."""
     drawn = pf.run(scene).measures
     cases = pf.run_many(scene)
     for name in (*MAIN_MEASURES[:-1], "peak_frequency"):

@@ -101,7 +101,7 @@ KINDS = {
         ["--over", "contact.load=70 N..125 N:{n}"],
     ),
 }
-FAST = ("load", "step", "law keys", "table")
+FAST = ("law keys", "table")
 
 
 def write_inputs(n: int) -> None:
