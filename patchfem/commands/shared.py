@@ -4,6 +4,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Thread
@@ -309,7 +310,9 @@ class Progress:
 
     def __enter__(self) -> "Progress":
         if not self.is_silent:
-            Thread(target=self._show_elapsed_time, daemon=True).start()
+            # Without memory for another thread the run goes on without the elapsed time, and reports its own error.
+            with suppress(RuntimeError):
+                Thread(target=self._show_elapsed_time, daemon=True).start()
         return self
 
     def __exit__(self, *_) -> None:

@@ -430,7 +430,8 @@ def test_quasi_static_curve_ends_at_maximum_force():
 
 def test_backbone_of_a_face_states_the_subtracted_joint():
     """The scene in SI of a bench over a face has the stiffness that was subtracted from the modes, as a number."""
-    curves = pf.backbone(pf.new("area"), **{"contact.area.cells": 32, "slide.amplitude": "1 um"})
+    keys = {"contact.area.cells": 32, "slide.amplitude": "1 um"}
+    curves = pf.backbone(pf.new("area"), method="quasi-static", amplitudes="1 um..2 um:2", **keys)
     stuck = tomllib.loads(curves.attrs["scene"])["structure"]["measured_stiffness"]
     number, unit = stuck.split()
     assert float(number) == pytest.approx(358e6, rel=5e-3) and unit == "N/m"

@@ -253,7 +253,17 @@ SWEEPS = {
 }
 
 
-@pytest.mark.parametrize("kind", SWEEPS)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "cases",
+        "sobol",
+        "table",
+        "pairs",
+        "set",
+        *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("over", "random")),
+    ],
+)
 @pytest.mark.parametrize(
     "text, key",
     [(BONDED, "normal.load"), pytest.param(PRESSED, "contact.load", marks=pytest.mark.slow)],

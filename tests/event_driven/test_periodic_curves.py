@@ -20,6 +20,7 @@ MASS = 0.884
 RIG = make_modal_basis(W, 0.003, mass=MASS)
 CUBIC = 0.02 * MASS * W**2 / 1e-6  # 2 % of the stiffness of the flexure at 1 mm [N/m^3]
 LEVEL = 5 * G_N
+DRIVE = SineDrive(LEVEL, 2 * np.pi * 160)
 STEPS = PathSettings(0.0125, 0.05)
 IWAN = LawNumbers("masing", (-0.3, 0.5, 0.8, 0.2, 1, 0.0, 0.2, 0.0, 0.8))
 BONDS = LawNumbers(
@@ -52,8 +53,8 @@ def trace_frequencies(modes, laws, level, ends):
     return equations, equations.follow(ends, STEPS)
 
 
-def trace_levels(modes, laws, drive):
-    """Return the equations and the path of the motions over the level [m s-2] of a drive, up to ten times its own."""
+def trace_levels(modes, laws, drive, end=10.0):
+    """Return the equations and the path of the motions over the level [m s-2] of a drive, up to `end` times its own."""
 
     def make(level):
         return make_case(modes, laws, SineDrive(level, drive.omega))
@@ -61,14 +62,19 @@ def trace_levels(modes, laws, drive):
     weak = 1e-2 * drive.acceleration
     start = (find_periodic_motion(make(weak)).run.final, weak)
     equations = MotionCurve(make, *start, has_kinks=False)
-    return equations, equations.follow((0.0, 10 * drive.acceleration), PathSettings(0.005, 0.02))
+    return equations, equations.follow((0.0, end * drive.acceleration), PathSettings(0.005, 0.02))
 
 
-def list_coexisting_motions(modes, laws, drive):
-    """Return the motions under a drive in increasing amplitude."""
-    equations, path = trace_levels(modes, laws, drive)
+def list_coexisting_motions(equations, path, drive):
+    """Return the motions of a curve over the level under a drive, in increasing amplitude."""
     motions = [point.motion for point in equations.list_crossings(path, drive.acceleration)]
     return sorted(motions, key=lambda motion: motion.run.values[AMPLITUDE])
+
+
+@pytest.fixture(scope="module")
+def curve_of_levels():
+    """Equations and path of the motions of the rig with a cubic spring at 160 Hz over the level."""
+    return trace_levels(RIG, DUFFING, DRIVE, 7.0)
 
 
 # ---- continuation
@@ -89,16 +95,15 @@ def test_continuation_ends_with_count_of_steps():
         shooting.relax(10)
 
 
-def test_closed_curve_ends_after_one_turn():
+def test_closed_curve_ends_after_one_turn(curve_of_levels):
     """At 160 Hz the level of the motions has a maximum L over their amplitude. Under the level (0.99 + p^2) L their curve
     over p is closed: it is followed once, and turns back where the level is L, at p = 0.1 and at p = -0.1."""
-    omega = 2 * np.pi * 160
-    equations, path = trace_levels(RIG, DUFFING, SineDrive(0.7 * LEVEL, omega))
+    equations, path = curve_of_levels
     highest = max(path.folds)
     start = equations.list_crossings(path, 0.99 * highest)[0].motion.run.final
 
     def make(p):
-        return make_case(RIG, DUFFING, SineDrive((0.99 + p * p) * highest, omega))
+        return make_case(RIG, DUFFING, SineDrive((0.99 + p * p) * highest, DRIVE.omega))
 
     closed = MotionCurve(make, start, 0.0, has_kinks=False).follow((-0.2, 0.2), PathSettings())
     assert closed.ended == "loop" and closed.folds == pytest.approx((0.1, -0.1), rel=2e-3)
@@ -145,23 +150,22 @@ def test_folds_are_near_those_of_one_harmonic():
     assert sorted(omega[changes]) == pytest.approx(folds, rel=2e-3)
 
 
-def test_exact_motions_and_stability_agree_with_dop853():
+def test_exact_motions_and_stability_agree_with_dop853(curve_of_levels):
     """At 160 Hz three motions exist, of which the middle one is unstable. DOP853 returns to the state of each after a
     period, and its differences give the Floquet multipliers within 1e-4."""
-    drive = SineDrive(LEVEL, 2 * np.pi * 160)
-    motions = list_coexisting_motions(RIG, DUFFING, drive)
+    motions = list_coexisting_motions(*curve_of_levels, DRIVE)
     assert [motion.is_stable for motion in motions] == [True, False, True]
 
     def integrate(start):
         def state_derivative(t, y):
             z, v = y
             force = W**2 * z + 0.006 * W * v + CUBIC / MASS * z**3
-            return [v, -force - drive.values(t)]
+            return [v, -force - DRIVE.values(t)]
 
-        span = (0, drive.period)
+        span = (0, DRIVE.period)
         return solve_ivp(state_derivative, span, start, "DOP853", rtol=1e-12, atol=1e-15).y[:, -1]
 
-    scale = np.array([1.0, drive.omega])
+    scale = np.array([1.0, DRIVE.omega])
     for motion in motions:
         start = motion.run.case.y[:2]
         size = motion.run.values[AMPLITUDE]
@@ -183,7 +187,8 @@ def test_exact_all_three_motions_near_fold_are_found():
     limit = 0.3 * 26 * 4.4482216152605
     laws = [masing.from_elements([limit / 1e-6], [1e-6]), LawNumbers("springs", (2e10, 0.0, 1.0))]
     for hertz in np.linspace(147.2, 147.6, 5):
-        motions = list_coexisting_motions(RIG, laws, SineDrive(6 * G_N, 2 * np.pi * hertz))
+        drive = SineDrive(6 * G_N, 2 * np.pi * hertz)
+        motions = list_coexisting_motions(*trace_levels(RIG, laws, drive), drive)
         assert [motion.is_stable for motion in motions] == [True, False, True], hertz
 
 
@@ -212,14 +217,14 @@ def test_curve_passes_where_the_reversal_is_at_the_start_of_the_period():
 )
 def test_points_of_curve_agree_with_long_runs(law):
     """Points of the curve of a mass on a spring through its resonance have the amplitudes and losses of runs from rest of
-    300 cycles, within 2e-3; the memory of the transient may shift the loop of a run. All points are stable."""
+    100 cycles, within 2e-3; the memory of the transient may shift the loop of a run. All points are stable."""
     modes = make_modes(zeta=0.02)
     _, path = trace_frequencies(modes, [law], 0.5, (0.6, 3.0))
     assert path.ended == "end" and not path.folds
     assert all(point.motion.is_stable for point in path.points)
     for point in path.points[:: len(path.points) // 5]:
         values = point.motion.run.values
-        run = runs.run_case(make_case(modes, [law], SineDrive(0.5, point.w[-1]), 300)).values
+        run = runs.run_case(make_case(modes, [law], SineDrive(0.5, point.w[-1]), 100)).values
         for name in (AMPLITUDE, "loop_area"):
             assert values[name] == pytest.approx(run[name], rel=2e-3), (point.w[-1], name)
 

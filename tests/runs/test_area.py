@@ -32,8 +32,8 @@ MODES = [
 ]
 RIG = {
     "structure": {"moving_mass": "0.884 kg", "mode": MODES},
-    "drive": {"kind": "base", "frequency": "143 Hz", "acceleration": "5 g", "cycles": 200},
-    "accuracy": {"tolerance": 1e-2, "steps_per_cycle": 800},
+    "drive": {"kind": "base", "frequency": "143 Hz", "acceleration": "5 g", "cycles": 120},
+    "accuracy": {"tolerance": 1e-2, "steps_per_cycle": 400},
 }
 
 

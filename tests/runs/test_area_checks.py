@@ -107,7 +107,7 @@ def test_exact_sphere_on_springs(radius=0.5):
 def test_small_sphere_is_hertz(load, radius=0.5):
     """5, 6: The contact of a small sphere is that of half-spaces within 1 %; an eighth of the load halves its radius."""
     sphere = {"crown": {"radius": f"{radius} m", "across": f"{radius} m"}, "load": f"{load!r} N"}
-    result = run(TITANIUM, sphere)
+    result = run(TITANIUM, sphere, {"area": {"cells": 256}})
     piece = pf.build({"contact": BLOCK | TITANIUM}).patch.pieces.lower.substrate
     modulus = piece.young / (1 - piece.poisson**2) / 2
     half = (3 * load * radius / 4 / modulus) ** (1 / 3)
@@ -127,14 +127,15 @@ def test_wide_flat_block_is_plane_strain(ratio=16):
         assert face.measures[name].value == pytest.approx(expected[name].value, rel=0.02)
 
 
+COARSE = {"area": {"cells": 64}}
 SHAPES = {"tilt": {"angle": "0.05 mrad", "roll": "0.08 mrad"}, "crown": {"radius": "60 m"}}
 
 
 def test_exact_approach_of_a_load_returns_the_load():
     """8: The approach that a load causes, prescribed, causes the load."""
     crown = {"crown": {"radius": "10 m", "across": "40 m"}}
-    approach = run(TITANIUM, crown).measures["approach"].value
-    prescribed = BLOCK | TITANIUM | crown | {"approach": {"distance": f"{approach!r} m"}}
+    approach = run(TITANIUM, crown, COARSE).measures["approach"].value
+    prescribed = BLOCK | TITANIUM | crown | COARSE | {"approach": {"distance": f"{approach!r} m"}}
     del prescribed["load"]
     result = pf.run({"contact": prescribed, "accuracy": {"tolerance": 1e-2}})
     assert result.measures["normal_load"].value == pytest.approx(LOAD, rel=1e-6)
@@ -142,9 +143,9 @@ def test_exact_approach_of_a_load_returns_the_load():
 
 def test_exact_opposite_tilts_mirror_the_contact():
     """9: Tilts of the other sign mirror the pressure."""
-    one = run(TITANIUM, SHAPES).patch.pressed.pressure
+    one = run(TITANIUM, SHAPES, COARSE).patch.pressed.pressure
     other = SHAPES | {"tilt": {"angle": "-0.05 mrad", "roll": "-0.08 mrad"}}
-    mirrored = run(TITANIUM, other).patch.pressed.pressure
+    mirrored = run(TITANIUM, other, COARSE).patch.pressed.pressure
     assert mirrored[::-1, ::-1] == pytest.approx(one, abs=1e-6 * one.max())
 
 
@@ -154,6 +155,7 @@ def test_exact_work_of_rigid_faces_on_a_spring():
     result = run(
         TITANIUM,
         SHAPES,
+        COARSE,
         {"holder": {"tangential_stiffness": "1e8 N/m"}},
         friction={"law": "coulomb", "static": 0.3},
         slide=slide,

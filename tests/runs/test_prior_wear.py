@@ -122,19 +122,25 @@ cycles = 1000
 """
 
 
+@pytest.fixture(scope="module")
+def worn_face(tmp_path_factory):
+    """Return a folder with the results of half of the wear of a face in one/, and the largest depth of the whole wear."""
+    folder = tmp_path_factory.mktemp("face")
+    pf.run(loads(FACE, folder / "a.toml")).save(folder / "one")
+    whole = pf.run(loads(FACE, folder / "a.toml", ["wear.cycles=2000"]))
+    return folder, whole.measures["worn_depth_max"]
+
+
 @pytest.mark.parametrize("cells", [32, 48])
-def test_worn_face_continues_on_its_own_and_on_other_cells(tmp_path, cells):
+def test_worn_face_continues_on_its_own_and_on_other_cells(worn_face, cells):
     """Two halves of the wear of a face agree with the whole run, and with Archard's volume k N s, within their errors."""
-    pf.run(loads(FACE, tmp_path / "a.toml")).save(tmp_path / "one")
+    folder, whole = worn_face
     sets = "wear.start=one/result.nc", f"contact.area.cells={cells}"
-    found = pf.run(loads(FACE, tmp_path / "a.toml", sets)).measures
-    whole = pf.run(loads(FACE, tmp_path / "a.toml", ["wear.cycles=2000"])).measures[
-        "worn_depth_max"
-    ]
+    found = pf.run(loads(FACE, folder / "a.toml", sets)).measures
     volume = found["worn_volume"]
     assert abs(volume.value - 1e-14 * 100 * 4 * 50e-6 * 2000) <= volume.error < 0.1 * volume.value
     depth = found["worn_depth_max"]
     assert abs(depth.value - whole.value) <= depth.error < 0.2 * depth.value
     message = "are not those of this scene .contact.width differ"
     with pytest.raises(pf.PatchfemError, match=message):
-        pf.run(loads(FACE, tmp_path / "a.toml", [*sets, "contact.width=5 mm"]))
+        pf.run(loads(FACE, folder / "a.toml", [*sets, "contact.width=5 mm"]))

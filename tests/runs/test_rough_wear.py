@@ -1,5 +1,7 @@
 """Scenes whose rough layer wears: volume, limits, errors, areal heights, earlier runs and refusals."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from command_line import run_cli, run_successfully
@@ -52,8 +54,9 @@ def folder(tmp_path_factory):
     return folder
 
 
+@cache
 def run_layer(folder, keys: str, shape: str = TILT, tolerance=1e-2, motion=MOTION):
-    """Run a patch with a layer of these keys [contact.asperities]."""
+    """Run a patch with a layer of these keys [contact.asperities]; tests share the result."""
     text = PATCH + shape + LAYER + keys + motion + TOLERANCE.format(tolerance)
     return pf.run(loads(text, folder / "scene.toml"))
 
@@ -131,13 +134,13 @@ def test_exact_deepest_tops_lose_the_heights_above_their_level(folder):
 def test_exact_split_trace_and_scan_give_the_heights(folder):
     """The short waves of the profile, and an areal scan beside [contact.area], are heights of a layer that wears."""
     profile = '[contact.profile]\nfile = "long.csv"\nheights = "surface"\n'
-    split = run_layer(folder, 'cutoff = "1 mm"\n' + HARD, shape=profile).measures
+    split = run_layer(folder, 'cutoff = "1 mm"\n' + HARD, profile, 0.1).measures
     area = "[contact.area]\ncells = 32\n"
     linear = (
         '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\nheights = "scan.csv"\n'
         + HARD
     )
-    text = PATCH + TILT + area + linear + MOTION + TOLERANCE.format(3e-2)
+    text = PATCH + TILT + area + linear + MOTION + TOLERANCE.format(0.1)
     face = pf.run(loads(text, folder / "scene.toml")).measures
     for measures in (split, face):
         assert measures["worn_volume"].value == pytest.approx(VOLUME, rel=1e-12)
@@ -147,9 +150,9 @@ def test_exact_split_trace_and_scan_give_the_heights(folder):
 
 def test_run_continues_and_compares(folder, tmp_path):
     """Two halves of a run agree with the whole, and `compare` gives the mean depth between them."""
-    text = PATCH + TILT + LAYER + HARD + FILE + MOTION + TOLERANCE.format(1e-2)
+    whole = run_layer(folder, HARD + FILE)
+    text = PATCH + TILT + LAYER + HARD + FILE + MOTION + TOLERANCE.format(0.1)
     (folder / "scene.toml").write_text(text)
-    whole = pf.run(folder / "scene.toml")
     half = {"wear.cycles": CYCLES / 2}
     pf.run(folder / "scene.toml", **half).save(tmp_path / "half")
     start = str(tmp_path / "half/result.nc")

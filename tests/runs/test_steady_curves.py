@@ -189,7 +189,7 @@ IWAN_MODES = (
 
 
 def test_exact_curve_of_iwan_law_with_five_modes_agrees_with_march():
-    """The curve has the amplitudes of a march of 800 cycles at its ends and at its peak within the error of the march, which
+    """The curve has the amplitudes of a march of 300 cycles at its ends and at its peak within the error of the march, which
     is below 3e-5 as its law has fewer cells; all of it is stable, and the motion from which it starts is near the origin:
     corrections to forces beyond the friction limit, which would hold it far away, are refused. After 200 cycles the
     transient of the march is still 1.3e-4."""
@@ -202,7 +202,7 @@ def test_exact_curve_of_iwan_law_with_five_modes_agrees_with_march():
     for point in (points[0], peak, points[-1]):
         state = point.guess.motion.run.final
         assert np.abs(state.y[:5]).max() <= 2 * point.values[AMPLITUDE]
-        sine = SINE.format(point.drive.omega / (2 * np.pi), 800).replace('"5 g"', '"14 g"')
+        sine = SINE.format(point.drive.omega / (2 * np.pi), 300).replace('"5 g"', '"14 g"')
         found = pf.run(IWAN_MODES + sine, **{"accuracy.method": "march"}).measures[AMPLITUDE]
         assert abs(found.value - point.values[AMPLITUDE]) <= found.error + 1e-8 * found.value
         assert found.error <= 3e-5 * found.value

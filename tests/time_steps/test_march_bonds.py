@@ -83,22 +83,24 @@ def test_exact_initial_loading_behind_spring_agrees_with_closed_form(order, curv
 @pytest.mark.parametrize("growth", [{}, GROWTH], ids=["constant", "grows"])
 @pytest.mark.parametrize(("reading", "order"), LAWS)
 def test_exact_energy_balance_over_reversals(reading, order, growth):
-    """Work, stored energy and losses are balanced over reversals and coarse steps.
+    """Work, stored energy and losses are balanced over reversals and coarse steps; the reading by stretch creates no energy.
 
-    The reading by stretch creates no energy beyond round-off, except in the first step for bonds of order 0, whose force
-    jumps there while coordinates of these random shapes move against the slide.
+    Where the pieces move by b against the slide s of a point, the force of a step does not do the work of the point, but
+    2 s b/(s + b) (mean of the path - mean of both ends) less. This vanishes with the third power of the step. Only
+    while points of order 0 stick before they slip does it exceed their losses: this first step is divided.
     """
     law = Bonds(0.4, 1e-6, order, reading, **growth)
     t = np.linspace(0, 1, 161)
     path = 3e-6 * np.sin(2 * np.pi * 2.5 * t) * (0.4 + t)  # five reversals at different slides [m]
+    path = np.insert(path, 1, path[1] * np.array([0.01, 0.1, 0.3, 0.5, 0.7]))
     rng = np.random.default_rng(3)
     shape = rng.normal(size=(4, 3)) / np.sqrt(0.4 * FORCE)[:, None]
     found = follow_path(make_lists(law, FORCE, make_shear(shape, [1e6, 3e6, 1e7])), path, 1e-3)
     assert found.n_unsolved == 0
     check_balance(found, path)
     losses = found.energies[:, 0]
-    created = -np.minimum(losses[1:], 0).sum()
-    assert reading == "report" or created < 1e-5 * losses.sum()
+    created = -np.minimum(losses, 0).sum()
+    assert reading == "report" or created < 1e-7 * losses.sum()
 
 
 def test_always_sudden_slip_dissipates_energy():

@@ -73,7 +73,7 @@ def test_laws_create_no_energy(name, varies):
     point = Point(LAWS[name])
     energy = point.values[Value.ENERGY]
     least = 0.0
-    for _ in range(20000):
+    for _ in range(5000):
         load = LOAD * rng.uniform(0.02, 2.0) if varies else LOAD
         slide = LENGTH * rng.normal() * 10 ** rng.uniform(-2, 0.7)
         after = point.slide(slide, slide / DURATION, load)

@@ -15,6 +15,7 @@ from patchfem.export import store
 SHIPPED = Path(__file__).parents[3] / "studies/rig/rig.toml"
 TILT = '[contact.tilt]\nangle = "0.05 mrad"\n'
 CROWN = '[contact.crown]\nradius = "3 m"\n'
+STEP = '[contact.step]\nheight = "0.1 um"\nat = "2 mm"\n'
 PATCH = BLOCK + COATING + TILT
 RIG = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "1 um"\n' + MODE
 DRIVE = '[drive]\nkind = "base"\nfrequency = "120 Hz"\nacceleration = "6 g"\ncycles = 60\n'
@@ -24,7 +25,7 @@ KINDS = {
     "tilt": (PATCH, ["--over", "contact.tilt.angle=-0.2 mrad..0.2 mrad:{n}"]),
     "crown": (PATCH + CROWN, ["--over", "contact.crown.radius=1 m..40 m:{n}"]),
     "step": (
-        PATCH + '[contact.step]\nheight = "0.1 um"\nat = "2 mm"\n',
+        PATCH + STEP,
         ["--over", "contact.step.height=-0.3 um..0.4 um:{n}"],
     ),
     "unlike": (
@@ -81,7 +82,7 @@ KINDS = {
             "{n}",
         ],
     ),
-    "table": (PATCH, ["--cases", "cases.csv"]),
+    "table": (PATCH + STEP, ["--cases", "cases.csv"]),
     **{
         law: (
             SCENE.format(law=text, drive=DRIVES["drive.acceleration"]),
@@ -101,7 +102,8 @@ KINDS = {
         ["--over", "contact.load=70 N..125 N:{n}"],
     ),
 }
-FAST = ("load", "step", "law keys", "table")
+FAST = ("law keys", "table")
+CASE_COLUMNS = "contact.load [N],contact.tilt.angle [mrad],contact.step.height [um]"
 
 
 def write_inputs(n: int) -> None:
@@ -111,14 +113,12 @@ def write_inputs(n: int) -> None:
         rows = [f"{7 * x:.6f},{z:.6f}" for x, z in zip(t, shape)]
         Path(name).write_text("\n".join(["x [mm],z [um]", *rows]) + "\n")
     rng = np.random.default_rng(n)
-    loads, tilts = rng.uniform(30, 900, n), rng.uniform(-0.1, 0.1, n)
+    loads, tilts, steps = rng.uniform((30, -0.1, -0.3), (900, 0.1, 0.4), (n, 3)).T
     rows = [
-        f"{load:.4f},{tilt:.5f},{plane}"
-        for load, tilt, plane in zip(loads, tilts, n * ["strain", "stress"])
+        f"{load:.4f},{tilt:.5f},{step:.4f},{plane}"
+        for load, tilt, step, plane in zip(loads, tilts, steps, n * ["strain", "stress"])
     ]
-    Path("cases.csv").write_text(
-        "\n".join(["contact.load [N],contact.tilt.angle [mrad],contact.plane", *rows]) + "\n"
-    )
+    Path("cases.csv").write_text("\n".join([f"{CASE_COLUMNS},contact.plane", *rows]) + "\n")
 
 
 def compare_kind(kind: str, n: int, n_compared: int | None = None) -> list[float]:
