@@ -50,9 +50,9 @@ def test_always_shared_friction_balances_energy(seed):
 
 
 def test_shared_friction_is_the_limit_of_stiff_springs():
-    """The motion on rigid faces is that on stiff elastic-plastic ones, whose elastic length is 1e-5 of the motion."""
-    modes, drive, limits = make_block(9, 400)
+    """The motion on rigid faces is that on stiff elastic-plastic ones, whose elastic length is below 1e-6 of the motion."""
+    modes, drive, limits = make_block(2, 400)
     rigid = make_contact([make_coulomb(limit, limit) for limit in limits], modes.interfaces)
-    stiff = make_contact([laws.make_cells(limit, 1e-5, 1.0) for limit in limits], modes.interfaces)
-    motions = [march(modes, drive, contact, 19, 160).response.output for contact in (rigid, stiff)]
-    assert np.abs(motions[0] - motions[1]).max() < 1e-3 * np.abs(motions[0]).max()
+    stiff = make_contact([laws.make_cells(limit, 1e-6, 1.0) for limit in limits], modes.interfaces)
+    motions = [march(modes, drive, contact, 19, 640).response.output for contact in (rigid, stiff)]
+    assert np.abs(motions[0] - motions[1]).max() < 5e-4 * np.abs(motions[0]).max()
