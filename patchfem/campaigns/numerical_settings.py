@@ -38,6 +38,8 @@ DEFAULT_MIDDLE_COUNT = 8  # middle value of a count that the scene does not set
 TOLERANCE_SETTING = "tolerance"
 # Tolerances for a series of runs; smaller ones take long and are rarely met.
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
+# Further ones of a motion from event to event without a mesh, which has errors near 1e-6 at all of these
+FINE_TOLERANCES = (1e-5, 1e-6)
 
 
 class Setting(NamedTuple):
@@ -77,6 +79,12 @@ def find_applicable_settings(model: Model) -> list[str]:
     return [name for name in NUMERICAL_SETTINGS if applies[name]]
 
 
+def follows_tolerance(model: Model) -> bool:
+    """Return whether the tolerance alone sets the error of a model: a motion from event to event, without a mesh."""
+    is_from_event_to_event = model.rig is not None and plan(model).engine == "event_driven"
+    return is_from_event_to_event and not find_applicable_settings(model)
+
+
 def make_setting_values(model: Model, name: str) -> list[Setting]:
     """Return the values of a numerical setting of a model, or of its tolerance, from coarse to fine.
 
@@ -87,7 +95,8 @@ def make_setting_values(model: Model, name: str) -> list[Setting]:
     """
     words = name.replace("_", " ")
     if name == TOLERANCE_SETTING:
-        values = sorted({*TOLERANCES, model.accuracy.tolerance}, reverse=True)
+        finer = FINE_TOLERANCES if follows_tolerance(model) else ()
+        values = sorted({*TOLERANCES, *finer, model.accuracy.tolerance}, reverse=True)
     elif name == "element_size":
         length = model.patch.pieces.length
         cells = round(length / model.patch.uniform_element_size)
