@@ -79,24 +79,38 @@ def find_applicable_settings(model: Model) -> list[str]:
     return [name for name in NUMERICAL_SETTINGS if applies[name]]
 
 
-def follows_tolerance(model: Model) -> bool:
-    """Return whether the tolerance alone sets the error of a model: a motion from event to event, without a mesh."""
+def choose_tolerances(model: Model) -> tuple[float, ...]:
+    """Return the tolerances of a series of runs of a model; they reach further for a motion from event to event alone."""
     is_from_event_to_event = model.rig is not None and plan(model).engine == "event_driven"
-    return is_from_event_to_event and not find_applicable_settings(model)
+    if is_from_event_to_event and not find_applicable_settings(model):
+        return TOLERANCES + FINE_TOLERANCES
+    return TOLERANCES
 
 
-def make_setting_values(model: Model, name: str) -> list[Setting]:
+def make_setting_values(
+    model: Model, name: str, tolerances: tuple[float, ...] = TOLERANCES
+) -> list[Setting]:
     """Return the values of a numerical setting of a model, or of its tolerance, from coarse to fine.
 
     The tolerances contain that of the scene. The last value of a setting is the automatic one. There are fewer coarse
     values if the value of the scene is small.
 
-    `name` is that of the setting, such as "element_size", or TOLERANCE_SETTING.
+    Parameters
+    ----------
+    model : Model
+        Model of the scene with its own settings.
+    name : str
+        Name of the setting, such as "element_size", or TOLERANCE_SETTING.
+    tolerances : tuple of float
+        Values of the tolerance.
+
+    Returns
+    -------
+    list of Setting
     """
     words = name.replace("_", " ")
     if name == TOLERANCE_SETTING:
-        finer = FINE_TOLERANCES if follows_tolerance(model) else ()
-        values = sorted({*TOLERANCES, *finer, model.accuracy.tolerance}, reverse=True)
+        values = sorted({*tolerances, model.accuracy.tolerance}, reverse=True)
     elif name == "element_size":
         length = model.patch.pieces.length
         cells = round(length / model.patch.uniform_element_size)

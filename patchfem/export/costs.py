@@ -74,7 +74,9 @@ class Row(NamedTuple):
         return self.worst.judge(self.run.tolerance)
 
 
-def make_cost_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
+def make_cost_answer(
+    curves: dict[str, list[Cost]], model: Model, notes: Sequence[str] = ()
+) -> Answer:
     """Return the answer of the command `cost`: the CPU time and the accuracy of runs of a scene.
 
     Parameters
@@ -83,6 +85,8 @@ def make_cost_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         The runs, from coarse to fine, by what varies: TOLERANCE_SETTING, or the name of a numerical setting.
     model : Model
         Model of the scene as it is, which no run changes.
+    notes : sequence of str
+        Sentences on what is computed.
 
     Returns
     -------
@@ -116,7 +120,8 @@ def make_cost_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     row = next(row for row in rows if row.run is chosen)
     sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE_SETTING else []
     # each tolerance has its own advice, but only the best value of a setting
-    notes = _describe_advice(rows[: len(runs)] if knob == TOLERANCE_SETTING else [row])
+    advice = _describe_advice(rows[: len(runs)] if knob == TOLERANCE_SETTING else [row])
+    notes = [*notes, *advice]
     if model.patch is not None and model.patch.mesh.file is not None:
         notes.append("The mesh of the file is the same in all runs.")
     if converged and list(curves) == [TOLERANCE_SETTING]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from command_line import run_cli
-from scene_texts import PIECE
+from scene_texts import PIECE, POINT, STRUCTURE
 
 import patchfem as pf
 from patchfem import build
@@ -15,6 +15,9 @@ from patchfem.campaigns import (
     describe_best_setting,
     numerical_settings,
 )
+from patchfem.campaigns.backbone import cost as backbone_cost
+from patchfem.campaigns.backbone.amplitudes import default_amplitudes
+from patchfem.campaigns.backbone.joint import build_joint
 from patchfem.campaigns.convergence import (
     extrapolate_sufficient_run,
     find_order,
@@ -26,6 +29,7 @@ from patchfem.export.costs import describe_convergence, make_cost_answer
 from patchfem.export.show import make_lines
 from patchfem.runs.run import run
 
+IWAN = '[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e6 N/m"\nchi = -0.5\nbeta = 0.5\n'
 TEXT = (
     PIECE
     + """\
@@ -226,3 +230,34 @@ def test_exact_key_of_the_scene_names_its_setting():
     ]
     labels = [[run["label"] for run in curve["steps_per_cycle"]["runs"]] for curve in curves]
     assert labels[0] == labels[1]
+
+
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])
+def test_always_convergence_of_motion_from_event_to_event_is_over_the_tolerance(law):
+    """A rig without a mesh has a table over the tolerance; its error is of first order in that of a step, or smaller."""
+    bond = 'bond_length = "1 um"\n' * (law != "coulomb")
+    text = POINT + f'[friction]\nlaw = "{law}"\nstatic = 0.3\n{bond}' + STRUCTURE
+    answer = pf.cost(text, say=lambda line: None)
+    assert {row["setting"] for row in answer["convergence"]} == {"tolerance"}
+    (amplitude,) = [
+        row for row in answer["convergence"] if row["measure"] == "relative_displacement_amplitude"
+    ]
+    assert 0.7 < amplitude["order"] < 2.0
+    assert amplitude["for_1_permille"].startswith("0.1, ")
+    assert max(amplitude["changes"]) < 1e-6
+
+
+def test_exact_cost_of_backbone_has_values_of_backbone(monkeypatch):
+    """`cost` of a backbone has the values and the errors of its curve, and a scene without [drive] has one."""
+    monkeypatch.setattr(backbone_cost, "TOLERANCES", (1e-3,))
+    text = POINT + IWAN + STRUCTURE.partition("[drive]")[0]
+    answer = pf.cost(text, backbone=True, say=lambda line: None)
+    (run_of_curve,) = answer["tolerance"]["runs"]
+    ends = default_amplitudes([build_joint(build(POINT + IWAN + STRUCTURE), "")])[[0, -1]]
+    curves = pf.backbone(text, amplitudes=np.geomspace(*ends, 5))
+    for name in ("frequency", "damping", "force"):
+        for k, place in ((0, "smallest"), (-1, "largest")):
+            for part, column in (("values", name), ("errors", f"{name}_error")):
+                found = run_of_curve[part][f"{name}_at_{place}_amplitude"]
+                assert found == pytest.approx(curves[f"balance_{column}"].values[k], rel=1e-9)
+    assert run_of_curve["meets_tolerance"]

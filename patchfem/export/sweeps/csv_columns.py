@@ -83,7 +83,17 @@ def _list_numbers(numbers: np.ndarray, number_format: str, part: slice) -> list[
 
 
 def write_csv(columns: Sequence[CsvColumn], n_cases: int, path: Path) -> None:
-    """Write the columns of `n_cases` cases, as `list_columns` returns them, to the file sweep.csv."""
+    """Write sweep.csv.
+
+    Parameters
+    ----------
+    columns : sequence of CsvColumn
+        Columns, as `list_columns` returns them.
+    n_cases : int
+        Number of their rows.
+    path : Path
+        File to write.
+    """
 
     def make_rows(first: int) -> Iterator[tuple[str, ...]]:
         """Return the rows of a part of the cases, because the cells of all cases would fill the memory."""
