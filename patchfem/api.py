@@ -701,7 +701,8 @@ class SweepPlots:
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
         """Plot a measure of a sweep against the key with the most values, with error bars.
 
-        Crosses mark cases that did not settle. An axis whose values span more than two decades is logarithmic.
+        Crosses mark cases that did not settle, with their steady estimate where it counts. An axis whose values span more
+        than two decades is logarithmic.
 
         Parameters
         ----------
