@@ -16,8 +16,6 @@ from patchfem.campaigns import (
     numerical_settings,
 )
 from patchfem.campaigns.backbone import cost as backbone_cost
-from patchfem.campaigns.backbone.amplitudes import default_amplitudes
-from patchfem.campaigns.backbone.joint import build_joint
 from patchfem.campaigns.convergence import (
     extrapolate_sufficient_run,
     find_order,
@@ -248,16 +246,19 @@ def test_always_convergence_of_motion_from_event_to_event_is_over_the_tolerance(
 
 
 def test_exact_cost_of_backbone_has_values_of_backbone(monkeypatch):
-    """`cost` of a backbone has the values and the errors of its curve, and a scene without [drive] has one."""
+    """`cost` of a backbone has the values and the errors of its curve, and a scene without [drive] has a backbone."""
+    ends = np.array([4e-7, 1e-3])
     monkeypatch.setattr(backbone_cost, "TOLERANCES", (1e-3,))
+    monkeypatch.setattr(backbone_cost, "N_AMPLITUDES", 2)
+    monkeypatch.setattr(backbone_cost, "default_amplitudes", lambda _: ends)
     text = POINT + IWAN + STRUCTURE.partition("[drive]")[0]
     answer = pf.cost(text, backbone=True, say=lambda line: None)
     (run_of_curve,) = answer["tolerance"]["runs"]
-    ends = default_amplitudes([build_joint(build(POINT + IWAN + STRUCTURE), "")])[[0, -1]]
-    curves = pf.backbone(text, amplitudes=np.geomspace(*ends, 5))
+    curves = pf.backbone(text, amplitudes=ends)
     for name in ("frequency", "damping", "force"):
         for k, place in ((0, "smallest"), (-1, "largest")):
-            for part, column in (("values", name), ("errors", f"{name}_error")):
-                found = run_of_curve[part][f"{name}_at_{place}_amplitude"]
-                assert found == pytest.approx(curves[f"balance_{column}"].values[k], rel=1e-9)
+            found = f"{name}_at_{place}_amplitude"
+            value, error = (curves[f"balance_{one}"].values[k] for one in (name, f"{name}_error"))
+            assert run_of_curve["values"][found] == pytest.approx(value, rel=1e-9)
+            assert run_of_curve["errors"][found] == pytest.approx(error, rel=1e-9)
     assert run_of_curve["meets_tolerance"]

@@ -191,7 +191,7 @@ def test_exact_charts_show_steady_estimates_and_no_ratio_to_round_off(tmp_path):
     Its round-off, such as 1e-25 m of a contact that sticks, once gave ratios of 1e22.
     """
     scene = POINT + COULOMB + STRUCTURE
-    data = pf.sweep(scene, {"drive.acceleration": "3 g..8 g:4"}, out=tmp_path / "sweep")
+    data = pf.sweep(scene, {"drive.acceleration": "3 g..8 g:2"}, out=tmp_path / "sweep")
     answer = store.read_answer(tmp_path / "sweep")
     chart = next(one for one in CHARTS["sweep"] if one.style == "relative")
     drawn = make_relative({"": answer}, chart)
