@@ -170,7 +170,15 @@ def make_tables(answer: Answer) -> list[Table]:
         columns = [one for one in parse_columns(table.columns) if one.name in known]
         headings = [_find_heading(answer, column) for column in columns]
         largest = _find_largest(rows, columns)
-        texts = [[_format_cell(row, column, largest) for column in columns] for row in rows]
+        # A column headed by its description has the display unit of what the description names.
+        names = [
+            heading.replace(" ", "_") if column.heading == "*" else column.name
+            for column, heading in zip(columns, headings, strict=True)
+        ]
+        named = list(zip(columns, names, strict=True))
+        texts = [
+            [_format_cell(row, column, largest, name) for column, name in named] for row in rows
+        ]
         tables.append({"title": table.title, "headings": headings, "rows": texts})
     return [table for table in tables if table["rows"]]
 
@@ -191,8 +199,22 @@ def _find_largest(rows: list[Cells], columns: list[Column]) -> dict[str, float]:
     return largest
 
 
-def _format_cell(row: Cells, column: Column, largest: dict[str, float]) -> str:
-    """Return a cell of a table as text; a missing value is a dash, and round-off beside the `largest` of the column is 0."""
+def _format_cell(row: Cells, column: Column, largest: dict[str, float], name: str) -> str:
+    """Return a cell of a table as text.
+
+    A missing value is a dash, and round-off beside the largest value of the column is 0.
+
+    Parameters
+    ----------
+    row : dict
+        Cells of the row by name.
+    column : Column
+        Column of the cell.
+    largest : dict of str to float
+        Largest magnitude in each column.
+    name : str
+        Name of the quantity in the column, which sets its display unit.
+    """
     cell = row.get(column.name)
     if cell is not None and column.style == "quantity":
         cell = make_quantity(row)
@@ -206,7 +228,7 @@ def _format_cell(row: Cells, column: Column, largest: dict[str, float]) -> str:
     if isinstance(cell, Quantity):
         if cell.value and abs(cell.value) <= quantities.VALUE_ROUND_OFF * largest[column.name]:
             return "0"
-        return quantities.format_quantity(column.name, cell)
+        return quantities.format_quantity(name, cell)
     if isinstance(cell, float):
         return f"{100 * cell:+.3g} %" if column.style == "percent" else format_number(cell, 6)
     return str(cell).replace("_", " ") if column.style == "name" else str(cell)

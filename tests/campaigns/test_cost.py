@@ -104,6 +104,15 @@ def test_exact_screen_shows_main_measure_of_every_run():
     assert "  1.000 ± 0.040  meets" in lines[2] and "unknown errors" in lines[3]
 
 
+def test_exact_screen_shows_a_main_measure_in_its_display_unit():
+    """A fraction that is the main measure is in percent in the table, as above it."""
+    runs = [make_cost("2", 1, 1e-2), make_cost("400", 12, 5e-3)]
+    for one in runs:
+        one.measures["contact_fraction"] = Measure(0.3, "1", 0.01)
+    lines = make_lines(make_cost_answer({"knob": runs}, build_model(tolerance=1e-3)))
+    assert "contact fraction" in lines[1] and "  30.0 ± 1.0 %  " in lines[2]
+
+
 def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
     """A run without an error estimate neither meets nor misses its tolerance in sentences, table and page."""
     runs = [replace(make_cost(str(k), 1, 1e-4), tolerance=10.0**-k) for k in (2, 3, 4, 5)]
