@@ -17,7 +17,7 @@ from ..core import Measure, Missing, NotConverged, Outcome
 from ..cost_model import measure_cpu_time
 from ..disk.file_hashes import hash_named_files, iterate_texts
 from ..model.model import Model
-from ..model.source import locate_errors
+from ..model.source import Source, locate_errors
 from . import joint, refine
 from .findings import find_missed_measures, mark_unbalanced
 from .patch import area_motion, faces, mesh_levels, store, strength
@@ -454,11 +454,15 @@ def hash_run(model, patch, version: str) -> str:
         Version of the program.
     """
     scene = model.source.resolved
-    files = hash_named_files(iterate_texts(tomllib.loads(scene)), model.source.path.parent)
-    digest = hashlib.sha256(f"{version}\n{scene}\n{files}".encode())
+    digest = hashlib.sha256(f"{version}\n{scene}\n{hash_scene_files(model.source)}".encode())
     for array in () if patch is None else (patch.x, patch.unloaded_gap):
         digest.update(array.tobytes())
     return digest.hexdigest()
+
+
+def hash_scene_files(source: Source) -> list[list[str]]:
+    """Return [name, SHA-256] of every file that the scene of a model names, whose `source` is given."""
+    return hash_named_files(iterate_texts(tomllib.loads(source.resolved)), source.path.parent)
 
 
 def is_march(run_plan: Plan) -> bool:

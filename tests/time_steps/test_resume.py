@@ -265,3 +265,18 @@ def test_hash_of_run_changes_with_every_named_file(tmp_path, key):
         (tmp_path / "other.csv").write_text(other)
         hashes.append(hash_run(model, None, "1"))
     assert hashes[0] == hashes[1] != hashes[2]
+
+
+def test_refuses_to_resume_complete_run_with_older_files(tmp_path):
+    """A complete run is printed again only if the files of its scene have not changed since."""
+    table = tmp_path / "measured.csv"
+    table.write_text("frequency [Hz],input [g],acceleration [g]\n143,5,4\n")
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RIGS["one slide"] + '[measured]\nfile = "measured.csv"\n')
+    command = ("run", scene, "--no-page", "-o", tmp_path / "out")
+    run_successfully(*command)
+    assert "already complete" in run_successfully(*command, "--resume").err
+    end = (tmp_path / "out/summary.json").stat().st_mtime
+    os.utime(table, (end + 1, end + 1))
+    answer = run_cli(*command, "--resume")
+    assert answer.code == 2 and "a file that the scene names has changed" in answer.err
