@@ -66,12 +66,12 @@ class SweepView(NamedTuple):
 
         Steady estimates stand in place of the values of cases that did not settle, where statements on the sweep use them.
         """
-        values, errors = (self.split_lines(part) for part in (name, f"{name}_error"))
+        values = self.split_lines(name)
+        errors = self.split_lines(f"{name}_error")
         if f"{name}_steady" not in self.data:
             return values, errors
-        steady, steady_errors = (
-            self.split_lines(f"{name}_steady{part}") for part in ("", "_error")
-        )
+        steady = self.split_lines(f"{name}_steady")
+        steady_errors = self.split_lines(f"{name}_steady_error")
         is_used = self.find_symbols() == "x"
         is_used = is_used & (steady_errors <= MAX_TRUSTED_RELATIVE_ERROR * np.abs(steady))
         return np.where(is_used, steady, values), np.where(is_used, steady_errors, errors)
