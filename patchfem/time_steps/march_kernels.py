@@ -585,8 +585,6 @@ def solve_forces(system, level, step):
             return False
         descent = -find_potential_slope(system, level)
         if has_potential and descent < 0:
-            if has_lists and not is_shortest(system, level):
-                return False
             drop_negative_slopes(system)
             if not find_newton_step(system, level, step):
                 return False
