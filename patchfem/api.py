@@ -25,6 +25,8 @@ from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
 from .campaigns import numerical_settings
+from .campaigns.backbone import cost as backbone_cost
+from .campaigns.backbone import given_modes
 from .campaigns.backbone import request as backbone_requests
 from .campaigns.fits import request as fit_requests
 from .campaigns.fits.options import FitOptions
@@ -411,6 +413,7 @@ def cost(
     /,
     *,
     over: str = "",
+    backbone: bool = False,
     out: str | Path | None = None,
     say: Callable[[str], None] | None = None,
     **sets: Any,
@@ -423,6 +426,8 @@ def cost(
         As for `build`.
     over : str, optional
         Only setting to vary: "element_size", "cells", "steps_per_cycle", "shear_modes" or "jumps".
+    backbone : bool, optional
+        Measure the backbone of the first mode at five amplitudes, in place of the run of the scene.
     out : path, optional
         Folder for cost.csv and the page. Default: no files are written.
     say : callable, optional
@@ -455,10 +460,20 @@ def cost(
     >>> coarsest["label"], coarsest["meets_tolerance"]
     ('200', True)
     """
-    model = build(scene, **sets)
+
+    def build_with(tables: BackboneTables, _) -> Model:
+        """Build the model of the scene with the tables of a backbone."""
+        return build_model(_load_and_prepare(scene, tables, sets))
+
+    if backbone and not isinstance(scene, Model):
+        model = given_modes.prepare_model(build_with, "", ()).model
+    else:
+        model = build(scene, **sets)
+    subject = backbone_cost.make_backbone_subject(model) if backbone else cost_curves.RUN
     over = numerical_settings.SCENE_KEYS.get(_require_string(over, "cost: over"), over)
     report = _print_to_stderr if say is None else say
-    answer = costs.make_cost_answer(cost_curves.compute_costs(model, over, report), model)
+    curves = cost_curves.compute_costs(model, over, report, subject)
+    answer = costs.make_cost_answer(curves, model, subject.notes)
     if out is not None:
         _save(lambda _: answer, out)
     return answer.details
@@ -686,7 +701,8 @@ class SweepPlots:
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
         """Plot a measure of a sweep against the key with the most values, with error bars.
 
-        Crosses mark cases that did not settle. An axis whose values span more than two decades is logarithmic.
+        Crosses mark cases that did not settle, with their steady estimate where it counts. An axis whose values span more
+        than two decades is logarithmic.
 
         Parameters
         ----------

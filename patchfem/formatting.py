@@ -7,7 +7,6 @@ floor as 0.
 
 import math
 import re
-from itertools import pairwise
 from math import isfinite, log10
 
 DisplayUnit = tuple[str, float]  # name of a unit, and number of these in one SI unit
@@ -28,7 +27,7 @@ UNIT_LADDERS = {  # display units (name, number of these in one SI unit) for eac
     "N m-1": (("N/m", 1.0), ("N/mm", 1e-3), ("N/um", 1e-6)),
     "N m rad-1": (("N m/rad", 1.0), ("kN m/rad", 1e-3), ("MN m/rad", 1e-6)),
     "m2": (("um^2", 1e12), ("mm^2", 1e6), ("m^2", 1.0)),
-    "m3": (("um^3", 1e18), ("mm^3", 1e9)),
+    "m3": (("um^3", 1e18), ("mm^3", 1e9), ("m^3", 1.0)),
     "Hz": (("Hz", 1.0), ("kHz", 1e-3)),
     "m s-2": (("g", 1 / 9.80665),),
     "W": (("uW", 1e6), ("mW", 1e3), ("W", 1.0), ("kW", 1e-3)),
@@ -60,12 +59,15 @@ def choose_unit(ladder: tuple[DisplayUnit, ...], size: float) -> DisplayUnit:
     Returns
     -------
     DisplayUnit
-        The smallest unit in which the number is less than 1000, or less than 0.01 in the next larger unit.
+        The unit in which the number is between 1 and 1000, or else the one in which it is the fewest powers of ten away
+        from that; the smaller one of two.
     """
-    for (name, scale), (_, next_scale) in pairwise(ladder):
-        if abs(size) * scale < 1000 or abs(size) * next_scale < 1e-2:
-            return name, scale
-    return ladder[-1]
+    if not size:
+        return ladder[0]
+    powers = [log10(abs(size)) + log10(scale) for _, scale in ladder]
+    # A number that is rounded to 1000 belongs to the next unit.
+    distances = [max(-power, power - 3 + 10.0**-MAX_SIGNIFICANT_DIGITS, 0.0) for power in powers]
+    return ladder[distances.index(min(distances))]
 
 
 def choose_axis_unit(values, unit: str) -> DisplayUnit:

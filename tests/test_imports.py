@@ -75,18 +75,33 @@ def test_exact_run_loads_folders_of_its_scene(write_scene, tmp_path, kind):
 
 
 PATCH_KEYS = "elasticity.mortar surface"
+ROUGH_LAYER = (
+    "contact.asperity_laws contact.asperity_layer model.peaks model.layer_heights runs.patch.skin "
+    "wear.rough_layer surface"
+)
 RIG_KEYS = {"structure.bonded", "event_driven.periodic"}
 MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are loaded, modules that are not
     "patch": (
         PATCH,
         "contact.press contact.unilateral mesh.grid",
-        "kernel_cache contact.asperity_laws contact.bounded elasticity.mortar "
+        f"kernel_cache {ROUGH_LAYER} contact.bounded elasticity.mortar "
         "elasticity.recovery export mesh.pieces mesh.checks measures scipy skfem",
     ),
     "skin": (
         PATCH + '[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n',
         "contact.asperity_laws",
         PATCH_KEYS,
+    ),
+    "wear of a smooth patch": (
+        COATED + COULOMB + TRIANGLE + WEAR,
+        "runs.wear.evolve wear.jumps",
+        ROUGH_LAYER,
+    ),
+    "rig on a smooth patch": (COATED + COULOMB + STRUCTURE, "contact.press", ROUGH_LAYER),
+    "smooth face": (
+        COATED.replace('element_size = "0.5 mm"\n', "") + "[contact.area]\ncells = 32\n",
+        "runs.patch.area",
+        ROUGH_LAYER,
     ),
     "linear rig": (
         STRUCTURE,
@@ -111,7 +126,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
 }
 
 
-@pytest.mark.share(0)
+@pytest.mark.share(0, 2, 3, 4)
 @pytest.mark.parametrize("name", MODULES_OF_SCENES)
 def test_exact_run_loads_modules_of_its_keys(write_scene, name):
     """A run from Python loads the modules of the keys in its scene, and not those of absent keys."""

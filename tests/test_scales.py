@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 
+from patchfem.export.quantities import DISPLAY_UNIT_LADDERS
 from patchfem.formatting import (
     MAX_SIGNIFICANT_DIGITS,
     UNIT_LADDERS,
+    choose_unit,
     format_value,
     rewrite_powers_of_ten,
 )
@@ -68,6 +70,39 @@ def test_always_printed_value_lies_within_printed_error():
             assert bar <= last_digit or digits < MAX_SIGNIFICANT_DIGITS, (text, value, bar)
         assert unit == "1" or "e" not in text.split(" ")[0], text
     assert bars > 100
+
+
+@pytest.mark.parametrize("unit", DISPLAY_UNIT_LADDERS)
+def test_exact_number_is_between_1_and_1000_wherever_a_unit_of_the_ladder_exists(unit):
+    """Over a ladder the number has one to three digits before the point, or the fewest digits that a unit allows."""
+    ladder = DISPLAY_UNIT_LADDERS[unit]
+    scales = [scale for _, scale in ladder]
+    for size in np.geomspace(1e-3 / scales[0], 1e6 / scales[-1], 1999):
+        _, scale = choose_unit(ladder, size)
+        number = size * scale
+        others = [size * other for other in scales]
+        if any(1 <= other < 999.9999 for other in others):
+            assert 1 - 1e-6 <= number < 1000
+        # Without such a unit, the number is the nearest to 1 from below or to 1000 from above.
+        assert (
+            max(1 / number, number / 1000)
+            < 1.000001 * min(max(1 / other, other / 1000) for other in others)
+            or 1 <= number < 1000
+        )
+
+
+@pytest.mark.parametrize(
+    "volume, text",
+    [
+        (6.9392e-12, "0.0069392 mm^3"),  # a scar of a fretting test
+        (3.2e-17, "32 um^3"),
+        (4e-16, "400 um^3"),
+        (2.5e-8, "25 mm^3"),
+    ],
+)
+def test_exact_volume_is_written_with_few_digits(volume, text):
+    """Volumes between units stand in the nearer one."""
+    assert format_value(volume, None, 0.0, "m3") == text
 
 
 @pytest.mark.parametrize(

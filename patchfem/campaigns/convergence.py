@@ -11,9 +11,10 @@ from scipy.optimize import brentq
 
 from ..core import Measure
 from .cost import Cost
+from .numerical_settings import TOLERANCE_SETTING
 
-# Settings that are lengths; others are counts, whose reciprocals count as lengths
-LENGTH_SETTINGS = ("element_size",)
+# Settings that fall with the error; others are counts, whose reciprocals do
+FALLING_SETTINGS = ("element_size", TOLERANCE_SETTING)
 ORDER_RANGE = (0.05, 12.0)  # smallest and largest order that is looked for
 # Relative change of a value below which it counts as round-off, which has no order
 ROUND_OFF = 1e-11
@@ -98,9 +99,9 @@ def measure_convergence(
 
 
 def _measure_sizes(runs: list[Cost], setting: str) -> np.ndarray:
-    """Return the sizes (m,) of elements or steps in runs with a fixed setting: lengths [m], or the reciprocals of counts."""
+    """Return the sizes (m,) of elements or steps in runs with a fixed setting: lengths [m], tolerances, or 1/counts."""
     values = np.array([run.value for run in runs], float)
-    return values if setting in LENGTH_SETTINGS else 1 / values
+    return values if setting in FALLING_SETTINGS else 1 / values
 
 
 def find_order(sizes: np.ndarray, values: np.ndarray) -> float | None:
@@ -197,5 +198,5 @@ def extrapolate_sufficient_run(
         return None
     size = sizes[1] / ratio
     growth = max(0.0, np.log(pair[1].seconds / pair[0].seconds) / step)
-    value = size if setting in LENGTH_SETTINGS else 1 / size
+    value = size if setting in FALLING_SETTINGS else 1 / size
     return ExtrapolatedRun(float(value), float(pair[1].seconds * ratio**growth))

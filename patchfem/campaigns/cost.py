@@ -21,11 +21,11 @@ from ..model.model import Model
 from ..model.source import locate_errors
 from ..runs.plan import plan
 from ..runs.refine import is_main
-from ..runs.results.result import Result
 from ..runs.run import run as run_plan
 from .numerical_settings import (
     TOLERANCE_SETTING,
     Setting,
+    choose_tolerances,
     find_applicable_settings,
     make_setting_values,
 )
@@ -89,8 +89,58 @@ class Cost:
         return name in self.measures and self.measures[name].error is not None
 
 
+class SolvedSetting(NamedTuple):
+    """Measures of a model with one numerical setting.
+
+    - measures: measures by name.
+    - remedies: advice where the tolerance is missed.
+    - n_steps: time steps per cycle; None if the method takes no time steps.
+    - n_nodes: nodes of the interface; None without a patch.
+    """
+
+    measures: dict[str, Measure]
+    remedies: tuple[str, ...] = ()
+    n_steps: int | None = None
+    n_nodes: int | None = None
+
+
+class Subject(NamedTuple):
+    """What is computed with each setting: the run of a scene, or the backbone of a mode.
+
+    - find_settings: function of a Model that lists the NUMERICAL_SETTINGS with an effect.
+    - solve: function of a Model that returns its SolvedSetting.
+    - tolerances: those of a series; () for those of a run of the model.
+    - notes: sentences for the user on what is computed.
+    """
+
+    find_settings: Callable[[Model], list[str]]
+    solve: Callable[[Model], SolvedSetting]
+    tolerances: tuple[float, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def solve_run(model: Model) -> SolvedSetting:
+    """Run a model; the pieces are condensed again instead of being loaded from the cache."""
+    result = run_plan(plan(model), fresh=True)
+    advice = [finding.advice for finding in result.findings if finding.advice is not None]
+    return SolvedSetting(
+        measures=result.measures,
+        remedies=tuple(one.text for one in advice),
+        n_steps=result.settings.steps_per_cycle,
+        n_nodes=None if result.patch is None else int(result.patch.x.size),
+    )
+
+
+RUN = Subject(find_applicable_settings, solve_run)
+
+
 def compute_costs(
-    model: Model, over: str = "", say: Callable | None = None, *, varies_all: bool = False
+    model: Model,
+    over: str = "",
+    say: Callable | None = None,
+    subject: Subject = RUN,
+    *,
+    varies_all: bool = False,
 ) -> dict[str, list[Cost]]:
     """Run a model with several tolerances, and over its mesh or its steps.
 
@@ -102,6 +152,8 @@ def compute_costs(
         Only setting that varies, one of NUMERICAL_SETTINGS; "" for the tolerance and the first setting of the scene.
     say : callable, optional
         Called with a line of text for each run.
+    subject : Subject
+        What is computed with each setting.
     varies_all : bool
         Whether every setting of the scene varies besides the tolerance.
 
@@ -118,13 +170,13 @@ def compute_costs(
     names = [over]
     if not over:
         with locate_errors(model.source):
-            settings = find_applicable_settings(model)
+            settings = subject.find_settings(model)
         names = [TOLERANCE_SETTING, *settings[: None if varies_all else 1]]
-    return {name: compute_setting_costs(model, name, say) for name in names}
+    return {name: compute_setting_costs(model, name, say, subject) for name in names}
 
 
 def compute_setting_costs(
-    model: Model, setting_name: str, say: Callable | None = None
+    model: Model, setting_name: str, say: Callable | None = None, subject: Subject = RUN
 ) -> list[Cost]:
     """Run a model with several values of a numerical setting, from coarse to fine.
 
@@ -136,6 +188,8 @@ def compute_setting_costs(
         One of NUMERICAL_SETTINGS, or TOLERANCE_SETTING for several tolerances, which include that of the scene.
     say : callable, optional
         Called with a line of text for each run.
+    subject : Subject
+        What is computed with each setting.
 
     Returns
     -------
@@ -150,14 +204,16 @@ def compute_setting_costs(
         If fewer than three runs succeed, or none at any tolerance.
     """
     with locate_errors(model.source):
-        possible = find_applicable_settings(model)
+        possible = subject.find_settings(model)
         if setting_name not in (TOLERANCE_SETTING, *possible):
             raise PatchfemError(
                 f"cost --over {setting_name}: the cost of this setting cannot be measured for this scene; "
                 f"possible settings: {', '.join(possible) or 'none'}",
                 "",
             )
-        runs = _time_settings(make_setting_values(model, setting_name), say)
+        tolerances = subject.tolerances or choose_tolerances(model)
+        settings = make_setting_values(model, setting_name, tolerances)
+        runs = _time_settings(settings, say, subject)
     # Smallest number of runs of a curve over a setting
     if not runs or (len(runs) < 3 and setting_name != TOLERANCE_SETTING):
         raise NotConverged(
@@ -166,13 +222,13 @@ def compute_setting_costs(
     return runs
 
 
-def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
+def _time_settings(settings: list[Setting], say: Callable | None, subject: Subject) -> list[Cost]:
     """Run and time a model with each of some settings; settings that fail are left out.
 
-    `say`, if given, is called with a line of text that reports the progress.
+    `say`, if given, is called with a line of text that reports the progress, and `subject` says what is computed.
     """
     # The first run includes imports and compilation, which the timings must not contain.
-    _run_setting(settings[0], None)
+    _run_setting(settings[0], None, subject)
 
     runs = []
     for setting in settings:
@@ -183,7 +239,7 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
         while is_short and len(timings) < N_TIMINGS:
             compile_seconds = kernel_cache.COMPILE_SECONDS[0]
             begin = (_measure_cpu_time(), perf_counter())
-            result = _run_setting(setting, say)
+            result = _run_setting(setting, say, subject)
             if result is None:
                 break
             timings.append((_measure_cpu_time() - begin[0], perf_counter() - begin[1]))
@@ -200,12 +256,11 @@ def _time_settings(settings: list[Setting], say: Callable | None) -> list[Cost]:
     return runs
 
 
-def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Result) -> Cost:
+def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: SolvedSetting) -> Cost:
     """Return the cost of a setting from the timings and the result of its run.
 
     A timing is a pair of CPU time and elapsed time [s]. The shortest counts.
     """
-    advice = [finding.advice for finding in result.findings if finding.advice is not None]
     seconds, wall_seconds = min(timings)
     return Cost(
         label=setting.label,
@@ -216,9 +271,9 @@ def _make_cost(setting: Setting, timings: list[tuple[float, float]], result: Res
         timings=len(timings),
         measures={name: one for name, one in result.measures.items() if one.value is not None},
         tolerance=setting.model.accuracy.tolerance,
-        remedies=tuple(one.text for one in advice),
-        steps=result.settings.steps_per_cycle,
-        nodes=None if result.patch is None else int(result.patch.x.size),
+        remedies=result.remedies,
+        steps=result.n_steps,
+        nodes=result.n_nodes,
     )
 
 
@@ -228,13 +283,13 @@ def _measure_cpu_time() -> float:
     return process_time() + children.children_user + children.children_system
 
 
-def _run_setting(setting: Setting, say: Callable | None) -> Result | None:
-    """Run a model with a numerical setting; return None if it does not converge or runs out of memory.
+def _run_setting(setting: Setting, say: Callable | None, subject: Subject) -> SolvedSetting | None:
+    """Solve a `subject` with a numerical setting; return None if it does not converge or runs out of memory.
 
-    The pieces are condensed again instead of being loaded from the cache. say: called with the reason of a failure.
+    `say` is called with the reason of a failure.
     """
     try:
-        return run_plan(plan(setting.model), fresh=True)
+        return subject.solve(setting.model)
     except (NotConverged, MemoryError) as error:
         if say is not None:
             say(f"{setting.label}: left out ({error or 'out of memory'})")

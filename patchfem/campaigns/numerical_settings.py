@@ -38,6 +38,8 @@ DEFAULT_MIDDLE_COUNT = 8  # middle value of a count that the scene does not set
 TOLERANCE_SETTING = "tolerance"
 # Tolerances for a series of runs; smaller ones take long and are rarely met.
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
+# Further ones of a motion from event to event without a mesh, which has errors near 1e-6 at all of these
+FINE_TOLERANCES = (1e-5, 1e-6)
 
 
 class Setting(NamedTuple):
@@ -77,17 +79,38 @@ def find_applicable_settings(model: Model) -> list[str]:
     return [name for name in NUMERICAL_SETTINGS if applies[name]]
 
 
-def make_setting_values(model: Model, name: str) -> list[Setting]:
+def choose_tolerances(model: Model) -> tuple[float, ...]:
+    """Return the tolerances of a series of runs of a model; they reach further for a motion from event to event alone."""
+    is_from_event_to_event = model.rig is not None and plan(model).engine == "event_driven"
+    if is_from_event_to_event and not find_applicable_settings(model):
+        return TOLERANCES + FINE_TOLERANCES
+    return TOLERANCES
+
+
+def make_setting_values(
+    model: Model, name: str, tolerances: tuple[float, ...] = TOLERANCES
+) -> list[Setting]:
     """Return the values of a numerical setting of a model, or of its tolerance, from coarse to fine.
 
     The tolerances contain that of the scene. The last value of a setting is the automatic one. There are fewer coarse
     values if the value of the scene is small.
 
-    `name` is that of the setting, such as "element_size", or TOLERANCE_SETTING.
+    Parameters
+    ----------
+    model : Model
+        Model of the scene with its own settings.
+    name : str
+        Name of the setting, such as "element_size", or TOLERANCE_SETTING.
+    tolerances : tuple of float
+        Values of the tolerance.
+
+    Returns
+    -------
+    list of Setting
     """
     words = name.replace("_", " ")
     if name == TOLERANCE_SETTING:
-        values = sorted({*TOLERANCES, model.accuracy.tolerance}, reverse=True)
+        values = sorted({*tolerances, model.accuracy.tolerance}, reverse=True)
     elif name == "element_size":
         length = model.patch.pieces.length
         cells = round(length / model.patch.uniform_element_size)

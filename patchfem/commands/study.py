@@ -7,6 +7,8 @@ from cyclopts import Parameter
 
 from ..campaigns import cost as cost_curves
 from ..campaigns import numerical_settings
+from ..campaigns.backbone import cost as backbone_cost
+from ..campaigns.backbone import given_modes
 from ..campaigns.backbone import request as backbone_requests
 from ..campaigns.fits import request as fit_requests
 from ..export import backbones, costs, fits
@@ -19,6 +21,7 @@ from .shared import (
     Progress,
     Sets,
     UsageError,
+    flag_option,
     load_model,
     load_scene,
     print_message,
@@ -36,6 +39,10 @@ def cost(
         f"vary only one setting, where the scene uses it: {', '.join(numerical_settings.NUMERICAL_SETTINGS)}; also with its "
         "table, such as contact.element_size"
     ) = "",
+    of_backbone: flag_option(
+        "measure the backbone of the first mode at five amplitudes, in place of the run of SCENE",
+        "--backbone",
+    ) = False,
     set_: Sets = (),
     output_options: OutputGroup = DEFAULT_OUTPUT,
 ):
@@ -45,7 +52,12 @@ def cost(
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
-    scene_model = load_model(scene, set_)
+    subject = cost_curves.RUN
+    if of_backbone:
+        scene_model = given_modes.prepare_model(_make_backbone_builder(scene, set_), "", ()).model
+        subject = backbone_cost.make_backbone_subject(scene_model)
+    else:
+        scene_model = load_model(scene, set_)
     settings = numerical_settings.NUMERICAL_SETTINGS
     over = numerical_settings.SCENE_KEYS.get(over, over)
     if over and over not in settings:
@@ -56,9 +68,9 @@ def cost(
         """Run the scene with all settings."""
         report = None if output.quiet else print_message
         curves = cost_curves.compute_costs(
-            scene_model, over, report, varies_all=output_options.verbose
+            scene_model, over, report, subject, varies_all=output_options.verbose
         )
-        return costs.make_cost_answer(curves, scene_model)
+        return costs.make_cost_answer(curves, scene_model, subject.notes)
 
     save(measure_costs, output)
 
@@ -99,21 +111,28 @@ def backbone(
     Example: patchfem backbone joint.toml --modes "120 Hz:0.01, 170 Hz:0.02"
     """
 
-    def build_model(tables, sets: tuple[str, ...] | None):
-        """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
-        all_sets = () if sets is None else (*set_, *sets)
-        return model.build(load_scene(scene, all_sets, prepare=tables))
-
     if over and any(text.partition("=")[0] == over.partition("=")[0] for text in set_):
         raise UsageError(f"--over {over}: --set gives this key, too; remove one of them")
     output = output_options.into(f"{scene.stem}-backbone")
     report = output.report and (lambda name: print_message(f"{name} ..."))
+    build = _make_backbone_builder(scene, set_)
     request = backbone_requests.BackboneRequest(mode, amplitudes, forces, method, modes, over)
 
-    answer = save(lambda _: backbones.compute_answer(build_model, request, report), output)
+    answer = save(lambda _: backbones.compute_answer(build, request, report), output)
     cases = answer.details.get("cases", [answer.details])
     if not all(case["curves"] for case in cases):
         raise CommandExit(NOT_CONVERGED_EXIT_CODE)
+
+
+def _make_backbone_builder(scene: Path, set_: tuple[str, ...]):
+    """Return the function that builds the model of a scene with the tables of a backbone; `set_` are the texts of --set."""
+
+    def build_model(tables, sets: tuple[str, ...] | None):
+        """Build the model of the scene with further changes, or of the scene as written without `sets`."""
+        all_sets = () if sets is None else (*set_, *sets)
+        return model.build(load_scene(scene, all_sets, prepare=tables))
+
+    return build_model
 
 
 def fit(

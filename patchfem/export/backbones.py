@@ -7,8 +7,8 @@ import numpy as np
 from ..campaigns.backbone.records import (
     CURVE_METHODS,
     CURVE_QUANTITIES,
+    CURVE_UNITS,
     Backbone,
-    Curve,
     match_amplitudes,
 )
 from ..campaigns.backbone.request import BackboneCases, BackboneRequest, compute_cases
@@ -33,14 +33,13 @@ from .netcdf import from_dataset
 from .rows import make_details
 from .runs import make_origin
 
-# Columns of a curve and of its band, their units, and words for them in a sentence
+# Columns of a curve and of its band, and words for them in a sentence
 CURVE_COLUMNS = (
     "amplitude",
     *(name + end for name in CURVE_QUANTITIES for end in ("", "_error")),
     "force_frequency",
 )
 BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high")
-BACKBONE_UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1", "force": "N"}
 SENTENCE_NAMES = {"frequency": "frequency", "damping": "damping ratio"}
 # Significant digits in a sentence on the change of frequency or damping
 CHANGE_DIGITS = {"frequency": 5, "damping": 3}
@@ -129,11 +128,9 @@ def _make_quantities(backbone: Backbone) -> Quantities:
     out = {}
     curve = backbone.best
     if curve is not None:
+        for name, measure in curve.list_measures().items():
+            out[name] = Quantity(measure.value, measure.unit, measure.error)
         largest = int(np.argmax(curve.damping))
-        for name in CURVE_QUANTITIES:
-            out[f"{name}_at_smallest_amplitude"] = _make_point_quantity(curve, name, 0)
-            out[f"{name}_at_largest_amplitude"] = _make_point_quantity(curve, name, -1)
-        out["largest_damping"] = _make_point_quantity(curve, "damping", largest)
         # the peak of the damping lies between the neighbouring amplitudes; at an end of the curve its interval is unknown
         near = curve.amplitude[max(largest - 1, 0) : largest + 2]
         ends = near[[0, -1]] if near.size == 3 else (None, None)
@@ -151,13 +148,6 @@ def _make_quantities(backbone: Backbone) -> Quantities:
         "flutter_amplitude": Quantity(backbone.flutter, "m"),
     }
     return {name: one for name, one in out.items() if one.value is not None or one.reason}
-
-
-def _make_point_quantity(curve: Curve, name: str, k: int) -> Quantity:
-    """Return the value and the error of a column of a curve, such as "frequency" or "damping", at its point k."""
-    return Quantity(
-        getattr(curve, name)[k], BACKBONE_UNITS[name], getattr(curve, f"{name}_error")[k]
-    )
 
 
 def _make_verdict(backbone: Backbone, measures: Quantities) -> tuple[str, ...]:
@@ -268,7 +258,7 @@ def _make_data(backbones: Sequence[Backbone], axis: Axis | None = None) -> Varia
 
 def _find_unit(name: str) -> str:
     """Return the SI unit of a column of a curve, whose name may end in "_low", "_high" or "_error"."""
-    return BACKBONE_UNITS["frequency" if name == "force_frequency" else name.partition("_")[0]]
+    return CURVE_UNITS["frequency" if name == "force_frequency" else name.partition("_")[0]]
 
 
 def _make_details(backbone: Backbone) -> JsonObject:
@@ -357,11 +347,10 @@ def _compare_ends(cases: BackboneCases) -> tuple[tuple[str, ...], Quantities]:
     amplitude = start.amplitude[point]
     measures = {"compared_amplitude": Quantity(amplitude, "m")}
     for name, (step, error) in changes.items():
-        measures[f"{name}_change"] = Quantity(step[point], BACKBONE_UNITS[name], error[point])
+        measures[f"{name}_change"] = Quantity(step[point], CURVE_UNITS[name], error[point])
 
     ends = {
-        name: [_make_point_quantity(curve, name, point).value for curve in (start, end)]
-        for name in CURVE_QUANTITIES
+        name: [getattr(curve, name)[point] for curve in (start, end)] for name in CURVE_QUANTITIES
     }
     parts = [
         _describe_step(name, measures[f"{name}_change"], ends[name]) for name in SENTENCE_NAMES
@@ -393,7 +382,7 @@ def _describe_step(name: str, step: Quantity, values: list[float]) -> str:
     `name` is "frequency" or "damping", `step` the change with its error, and `values` are the first and the last
     value [SI].
     """
-    texts = [format_quantity(value, BACKBONE_UNITS[name], CHANGE_DIGITS[name]) for value in values]
+    texts = [format_quantity(value, CURVE_UNITS[name], CHANGE_DIGITS[name]) for value in values]
     if abs(step.value) <= step.error:
         return f"keeps the {SENTENCE_NAMES[name]} at {texts[0]}"
     verb = "raises" if step.value > 0 else "lowers"

@@ -170,7 +170,10 @@ def make_tables(answer: Answer) -> list[Table]:
         columns = [one for one in parse_columns(table.columns) if one.name in known]
         headings = [_find_heading(answer, column) for column in columns]
         largest = _find_largest(rows, columns)
-        texts = [[_format_cell(row, column, largest) for column in columns] for row in rows]
+        texts = []
+        for row in rows:
+            cells = zip(columns, headings, strict=True)
+            texts.append([_format_cell(row, column, largest, heading) for column, heading in cells])
         tables.append({"title": table.title, "headings": headings, "rows": texts})
     return [table for table in tables if table["rows"]]
 
@@ -191,8 +194,22 @@ def _find_largest(rows: list[Cells], columns: list[Column]) -> dict[str, float]:
     return largest
 
 
-def _format_cell(row: Cells, column: Column, largest: dict[str, float]) -> str:
-    """Return a cell of a table as text; a missing value is a dash, and round-off beside the `largest` of the column is 0."""
+def _format_cell(row: Cells, column: Column, largest: dict[str, float], heading: str) -> str:
+    """Return a cell of a table as text.
+
+    A missing value is a dash, and round-off beside the largest value of the column is 0.
+
+    Parameters
+    ----------
+    row : dict
+        Cells of the row by name.
+    column : Column
+        Column of the cell.
+    largest : dict of str to float
+        Largest magnitude in each column.
+    heading : str
+        Text above the column. If it is a description, what this names sets the display unit.
+    """
     cell = row.get(column.name)
     if cell is not None and column.style == "quantity":
         cell = make_quantity(row)
@@ -206,7 +223,8 @@ def _format_cell(row: Cells, column: Column, largest: dict[str, float]) -> str:
     if isinstance(cell, Quantity):
         if cell.value and abs(cell.value) <= quantities.VALUE_ROUND_OFF * largest[column.name]:
             return "0"
-        return quantities.format_quantity(column.name, cell)
+        name = heading.replace(" ", "_") if column.heading == "*" else column.name
+        return quantities.format_quantity(name, cell)
     if isinstance(cell, float):
         return f"{100 * cell:+.3g} %" if column.style == "percent" else format_number(cell, 6)
     return str(cell).replace("_", " ") if column.style == "name" else str(cell)

@@ -37,6 +37,12 @@ from .runs import make_origin
 
 # Tolerances for which a convergence table names the coarsest sufficient setting, by the name of their column
 SUFFICIENT_TOLERANCES = {"for_1_percent": 1e-2, "for_1_permille": 1e-3}
+# Note on a motion from event to event without a mesh
+TOLERANCE_CARRIES_ERROR_NOTE = (
+    "No mesh and no number of steps carries the error of this motion, but the tolerance of its steps from event to event: "
+    "1e-5 times accuracy.tolerance, at most 1e-8. Expected is an order of about 1 in accuracy.tolerance below 0.001, and no "
+    "change above it."
+)
 MINUTE = 60.0  # CPU seconds
 MIN_GROWTH = (
     1.5  # smallest ratio of two CPU times from which their growth is known; timings scatter less
@@ -68,7 +74,9 @@ class Row(NamedTuple):
         return self.worst.judge(self.run.tolerance)
 
 
-def make_cost_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
+def make_cost_answer(
+    curves: dict[str, list[Cost]], model: Model, notes: Sequence[str] = ()
+) -> Answer:
     """Return the answer of the command `cost`: the CPU time and the accuracy of runs of a scene.
 
     Parameters
@@ -77,6 +85,8 @@ def make_cost_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         The runs, from coarse to fine, by what varies: TOLERANCE_SETTING, or the name of a numerical setting.
     model : Model
         Model of the scene as it is, which no run changes.
+    notes : sequence of str
+        Sentences on what is computed.
 
     Returns
     -------
@@ -95,7 +105,8 @@ def make_cost_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         # the runs of a curve of tolerances have no tolerance in common
         sentence = None if one == TOLERANCE_SETTING else describe_best_setting(curve, tolerance)
         details[one] = {"runs": [describe_run(row) for row in knob_rows], "sentence": sentence}
-        if one != TOLERANCE_SETTING:
+        # without a mesh and steps of equal length, the tolerance carries the error
+        if one != TOLERANCE_SETTING or len(curves) == 1:
             converged += describe_convergence(
                 curve, one, [run for part in curves.values() for run in part]
             )
@@ -109,9 +120,12 @@ def make_cost_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
     row = next(row for row in rows if row.run is chosen)
     sentences = _describe_scene(row, rows[: len(runs)]) if knob == TOLERANCE_SETTING else []
     # each tolerance has its own advice, but only the best value of a setting
-    notes = _describe_advice(rows[: len(runs)] if knob == TOLERANCE_SETTING else [row])
+    advice = _describe_advice(rows[: len(runs)] if knob == TOLERANCE_SETTING else [row])
+    notes = [*notes, *advice]
     if model.patch is not None and model.patch.mesh.file is not None:
         notes.append("The mesh of the file is the same in all runs.")
+    if converged and list(curves) == [TOLERANCE_SETTING]:
+        notes.append(TOLERANCE_CARRIES_ERROR_NOTE)
     texts = [part["sentence"] for part in details.values() if part["sentence"]]
     sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]
     return Answer(

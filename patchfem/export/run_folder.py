@@ -11,7 +11,7 @@ from ..core import NotConverged, PatchfemError
 from ..runs.plan import Plan
 from ..runs.results.interfaces import PressedFace
 from ..runs.results.result import Result, shorten_file_names
-from ..runs.run import StateFile, is_march, run
+from ..runs.run import StateFile, hash_scene_files, is_march, run
 from . import page, store
 from .answer import Answer
 from .fields import vtkhdf
@@ -123,7 +123,7 @@ def is_complete(run_plan: Plan, target: Path) -> bool:
     """Return whether a folder contains the complete run of a plan.
 
     It is False for a folder with the state of an interrupted run. PatchfemError if the folder contains the complete run of
-    another scene or of another version.
+    another scene or of another version, or if a file that the scene names is younger than the run.
     """
     if list_states(target.parent / f"{target.name}.partial"):
         return False
@@ -138,11 +138,14 @@ def is_complete(run_plan: Plan, target: Path) -> bool:
     lines = [one for one in text.splitlines() if not one.startswith(solved)]
     planned = source.write_resolved(target).splitlines()
     planned = [one for one in planned if not one.startswith(solved)]
-    if version == __version__ and lines == planned:
+    end = (target / store.SUMMARY_FILE).stat().st_mtime
+    files = [source.path.parent / name for name, _ in hash_scene_files(source)]
+    is_older = all(path.stat().st_mtime <= end for path in files)
+    if version == __version__ and lines == planned and is_older:
         return True
     raise PatchfemError(
-        f"{target}: this folder has no interrupted run but the complete run of another scene or version; name another "
-        "folder with -o, or run without --resume to replace that run"
+        f"{target}: this folder has no interrupted run but the complete run of another scene or version, or a file that the "
+        "scene names has changed since then; name another folder with -o, or run without --resume to replace that run"
     )
 
 

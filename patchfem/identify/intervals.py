@@ -257,9 +257,9 @@ def compute_intervals(
         # parameter.
         if not half_width < 1e-9:
             is_exact = on_bound[k] or kind == IntervalKind.KNOWN
-            # Largest relative deviation of the growth of the sum of squares from that of a linear
-            # model at the end of an interval; beyond it, the profile is followed.
-            tolerance = 0.0 if is_exact else 0.2
+            # Largest relative deviation of the growth of the sum of squares from that of a linear model at the end of an
+            # interval, whose half-width then deviates by half of it; beyond it, the profile is followed.
+            tolerance = 0.0 if is_exact else 0.05
             found = [_find_end(linear, k, sign, growth, tolerance) for sign in (-1.0, 1.0)]
         distances = np.array([one.distance for one in found])
         open_ends[k] = ~np.isfinite(distances)

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
-from ..surface.areal import Areal, fill_nearest, find_scan_spikes, level
-from ..surface.files.read import read_surface
+from ..surface import areal
+from ..surface.files import read
 from .gap import ShapedGap
 from .patch import PatchModel
 from .source import cache_by_file, name_key
@@ -53,10 +53,10 @@ def compute_face_gap(patch: PatchModel, x: np.ndarray, y: np.ndarray) -> ShapedG
     return shaped.add_profile(measured - measured.min(), part.notes, process_time() - begin)
 
 
-def read_scan(path) -> Areal:
+def read_scan(path) -> "areal.Areal":
     """Read the areal scan in a file; PatchfemError for a trace."""
-    scan = read_surface(path)
-    if not isinstance(scan, Areal):
+    scan = read.read_surface(path)
+    if not isinstance(scan, areal.Areal):
         raise PatchfemError(
             f"{path}: a trace, but an areal scan is needed: give it as contact.profile.file"
         )
@@ -64,7 +64,7 @@ def read_scan(path) -> Areal:
 
 
 @cache_by_file
-def read_face(path, at: tuple[float, float] | None, length: float, width: float) -> Areal:
+def read_face(path, at: tuple[float, float] | None, length: float, width: float) -> "areal.Areal":
     """Read the part of an areal scan that lies over a face, levelled and without spikes.
 
     Parameters
@@ -78,7 +78,7 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
 
     Returns
     -------
-    Areal
+    areal.Areal
         Positions relative to the middle of the face, and heights [m] without gaps.
 
     Raises
@@ -87,7 +87,7 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
         If the file is not an areal scan, or covers less than half of the face.
     """
     scan = read_scan(path)
-    spikes = find_scan_spikes(scan)
+    spikes = areal.find_scan_spikes(scan)
     scan = replace(scan, z=np.where(spikes, np.nan, scan.z))
     middle = at or ((scan.x[0] + scan.x[-1]) / 2, (scan.y[0] + scan.y[-1]) / 2)
     x = scan.x - middle[0]
@@ -107,14 +107,14 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
     # One row of points beyond each side stays, if there is one.
     columns = _find_covering(x, length)
     rows = _find_covering(y, width)
-    part = Areal(
+    part = areal.Areal(
         frozen_array(x[columns]),
         frozen_array(y[rows]),
         scan.z[rows, columns],
         scan.source,
         scan.notes,
     )
-    part = level(part)
+    part = areal.level(part)
     notes = list(part.notes)
     if spikes.any():
         notes.append(f"{scan.source}: {int(spikes.sum())} heights of spikes were removed")
@@ -125,7 +125,7 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
             f"{scan.source}: the scan does not cover {100 * (1 - covered):.2g} % of the face, at its sides; the nearest "
             "heights are taken there"
         )
-    return replace(part, z=frozen_array(fill_nearest(part.z)), notes=tuple(notes))
+    return replace(part, z=frozen_array(areal.fill_nearest(part.z)), notes=tuple(notes))
 
 
 def _covered_length(places: np.ndarray, length: float) -> float:
@@ -143,14 +143,14 @@ def _find_covering(places: np.ndarray, length: float) -> slice:
     return slice(first, last)
 
 
-def average_over_cells(scan: Areal, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def average_over_cells(scan: "areal.Areal", x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Average the cubic spline through a scan over equal cells.
 
     Waves shorter than a cell do not pass for long ones. Beyond the scan the heights at its sides go on.
 
     Parameters
     ----------
-    scan : Areal
+    scan : areal.Areal
         Scan without gaps.
     x, y : (nx,) and (ny,) ndarray
         Centres of the cells [m].

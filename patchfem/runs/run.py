@@ -4,6 +4,7 @@ In: a `Plan`, or a Scene or Model that is planned first. Out: a `Result`.
 """
 
 import hashlib
+import tomllib
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
@@ -11,13 +12,12 @@ from pathlib import Path
 from time import process_time
 from typing import NamedTuple
 
-import numpy as np
-
 from .. import time_steps
 from ..core import Measure, Missing, NotConverged, Outcome
 from ..cost_model import measure_cpu_time
+from ..disk.file_hashes import hash_named_files, iterate_texts
 from ..model.model import Model
-from ..model.source import locate_errors
+from ..model.source import Source, locate_errors
 from . import joint, refine
 from .findings import find_missed_measures, mark_unbalanced
 from .patch import area_motion, case_meshes, faces, store, strength
@@ -441,8 +441,8 @@ def _note_on_yielding_faces(result: Result) -> "dict[strength.Strength, str]":
 def hash_run(model, patch, version: str) -> str:
     """Return the hash of a run, which a saved state must match.
 
-    It depends on the scene in SI units, the unworn gap at the nodes, the worn depth of an earlier
-    run, a displacement from a file, and the version of the program.
+    It depends on the scene in SI units, the contents of all files that it names, the unworn gap at the
+    nodes, and the version of the program.
 
     Parameters
     ----------
@@ -453,17 +453,16 @@ def hash_run(model, patch, version: str) -> str:
     version : str
         Version of the program.
     """
-    arrays = []
-    if patch is not None:
-        arrays += [patch.x, patch.unloaded_gap]
-    if model.wear is not None and model.wear.start is not None:
-        arrays += [*model.wear.start.axes, model.wear.start.depth]
-    if model.slide is not None and model.slide.corners is not None:
-        arrays += model.slide.corners
-    digest = hashlib.sha256(f"{version}\n{model.source.resolved}".encode())
-    for array in arrays:
-        digest.update(np.asarray(array).tobytes())
+    scene = model.source.resolved
+    digest = hashlib.sha256(f"{version}\n{scene}\n{hash_scene_files(model.source)}".encode())
+    for array in () if patch is None else (patch.x, patch.unloaded_gap):
+        digest.update(array.tobytes())
     return digest.hexdigest()
+
+
+def hash_scene_files(source: Source) -> list[list[str]]:
+    """Return [name, SHA-256] of every file that the scene of a model names, whose `source` is given."""
+    return hash_named_files(iterate_texts(tomllib.loads(source.resolved)), source.path.parent)
 
 
 def is_march(run_plan: Plan) -> bool:

@@ -219,7 +219,7 @@ def read_state(path: Path, key: str):
     PatchfemError
         If the state belongs to another computation or cannot be read.
     """
-    reason = "belongs to another scene or to another version of patchfem"
+    reason = "belongs to another scene or to another version of patchfem, or a file that the scene names has changed"
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}

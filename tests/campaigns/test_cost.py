@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from command_line import run_cli
-from scene_texts import PIECE
+from scene_texts import PIECE, POINT, STRUCTURE
 
 import patchfem as pf
 from patchfem import build
@@ -15,6 +15,7 @@ from patchfem.campaigns import (
     describe_best_setting,
     numerical_settings,
 )
+from patchfem.campaigns.backbone import cost as backbone_cost
 from patchfem.campaigns.convergence import (
     extrapolate_sufficient_run,
     find_order,
@@ -26,6 +27,7 @@ from patchfem.export.costs import describe_convergence, make_cost_answer
 from patchfem.export.show import make_lines
 from patchfem.runs.run import run
 
+IWAN = '[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e6 N/m"\nchi = -0.5\nbeta = 0.5\n'
 TEXT = (
     PIECE
     + """\
@@ -100,6 +102,15 @@ def test_exact_screen_shows_main_measure_of_every_run():
     forget_errors(runs[1], "a")
     lines = make_lines(make_cost_answer({"knob": runs}, build_model(tolerance=1e-3)))
     assert "  1.000 ± 0.040  meets" in lines[2] and "unknown errors" in lines[3]
+
+
+def test_exact_screen_shows_a_main_measure_in_its_display_unit():
+    """A fraction that is the main measure is in percent in the table, as above it."""
+    runs = [make_cost("2", 1, 1e-2), make_cost("400", 12, 5e-3)]
+    for one in runs:
+        one.measures["contact_fraction"] = Measure(0.3, "1", 0.01)
+    lines = make_lines(make_cost_answer({"knob": runs}, build_model(tolerance=1e-3)))
+    assert "contact fraction" in lines[1] and "  30.0 ± 1.0 %  " in lines[2]
 
 
 def test_exact_runs_with_unknown_errors_are_told_from_runs_that_miss():
@@ -226,3 +237,37 @@ def test_exact_key_of_the_scene_names_its_setting():
     ]
     labels = [[run["label"] for run in curve["steps_per_cycle"]["runs"]] for curve in curves]
     assert labels[0] == labels[1]
+
+
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])
+def test_always_convergence_of_motion_from_event_to_event_is_over_the_tolerance(law):
+    """A rig without a mesh has a table over the tolerance; its error is of first order in that of a step, or smaller."""
+    bond = 'bond_length = "1 um"\n' * (law != "coulomb")
+    text = POINT + f'[friction]\nlaw = "{law}"\nstatic = 0.3\n{bond}' + STRUCTURE
+    answer = pf.cost(text, say=lambda line: None)
+    assert {row["setting"] for row in answer["convergence"]} == {"tolerance"}
+    (amplitude,) = [
+        row for row in answer["convergence"] if row["measure"] == "relative_displacement_amplitude"
+    ]
+    assert 0.7 < amplitude["order"] < 2.0
+    assert amplitude["for_1_permille"].startswith("0.1, ")
+    assert max(amplitude["changes"]) < 1e-6
+
+
+def test_exact_cost_of_backbone_has_values_of_backbone(monkeypatch):
+    """`cost` of a backbone has the values and the errors of its curve, and a scene without [drive] has a backbone."""
+    ends = np.array([4e-7, 1e-3])
+    monkeypatch.setattr(backbone_cost, "TOLERANCES", (1e-3,))
+    monkeypatch.setattr(backbone_cost, "N_AMPLITUDES", 2)
+    monkeypatch.setattr(backbone_cost, "default_amplitudes", lambda _: ends)
+    text = POINT + IWAN + STRUCTURE.partition("[drive]")[0]
+    answer = pf.cost(text, backbone=True, say=lambda line: None)
+    (run_of_curve,) = answer["tolerance"]["runs"]
+    curves = pf.backbone(text, amplitudes=ends)
+    for name in ("frequency", "damping", "force"):
+        for k, place in ((0, "smallest"), (-1, "largest")):
+            found = f"{name}_at_{place}_amplitude"
+            value, error = (curves[f"balance_{one}"].values[k] for one in (name, f"{name}_error"))
+            assert run_of_curve["values"][found] == pytest.approx(value, rel=1e-9)
+            assert run_of_curve["errors"][found] == pytest.approx(error, rel=1e-9)
+    assert run_of_curve["meets_tolerance"]

@@ -18,7 +18,9 @@ Seeds 108000 to 108009 of each kind were fixed before the first fit with them an
 were 8800 to 8829, 99180000 to 99180029, 99190000 to 99190009 and 99282000 to 99282009 of loops and curves. Seeds 108300 to
 108309 of each kind are fixed for the search by bounded linear steps, and scored once, as are 20300101 to 20300110 and
 20300201 to 20300250 of each kind. Seeds 108500 to 108509 of each kind are fixed before their first fit, too,
-and so are 108600 to 108659 of loops, because 4 of 20 intervals of loops missed.
+and so are 108600 to 108659 of loops, because 4 of 20 intervals of loops missed. Seeds 108700 to 108709 of each kind were
+fixed before their first fit and scored once with ends of intervals that deviate by up to 10 % from the profile; seeds 108710
+to 108719 are fixed for ends that deviate by 2.5 %, and scored once.
 
 Run: PYTHONPATH=.:tests/support python tests/campaigns/test_made_fits.py KIND FIRST COUNT
 """

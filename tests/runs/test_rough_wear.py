@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from traces import format_trace
 
 import patchfem as pf
+from patchfem.runs.wear import evolve
 from patchfem.scene import loads
 
 LOAD = 100.0
@@ -184,3 +185,29 @@ def test_refuses_layer_without_heights(folder, text, code, message):
     (folder / "wrong.toml").write_text(text)
     answer = run_cli("check", folder / "wrong.toml")
     assert answer.code == code and message in " ".join((answer.out + answer.err).split())
+
+
+def test_refuses_to_resume_run_whose_heights_changed(folder, tmp_path, monkeypatch):
+    """An interrupted run goes on only while the file of the heights of its layer is the same."""
+    scene = tmp_path / "scene.toml"
+    wear = WEAR + "jumps = 2\n"
+    scene.write_text(
+        PATCH + TILT + LAYER + HARD + FILE + COULOMB + SLIDE + wear + TOLERANCE.format(3e-2)
+    )
+    heights = (folder / "heights.csv").read_text()
+    (tmp_path / "heights.csv").write_text(heights)
+    save = evolve.save_wear_state
+
+    def save_and_interrupt(*arguments):
+        save(*arguments)
+        raise KeyboardInterrupt
+
+    command = ("run", scene, "-o", tmp_path / "out", "--no-page")
+    with monkeypatch.context() as patched:
+        patched.setattr(evolve, "save_wear_state", save_and_interrupt)
+        assert run_cli(*command).code == 130
+
+    rows = heights.splitlines(keepends=True)
+    (tmp_path / "heights.csv").write_text("".join(rows[: len(rows) // 2]))
+    answer = run_cli(*command, "--resume")
+    assert answer.code == 2 and "a file that the scene names has changed" in answer.err

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,8 +29,17 @@ from patchfem import new
 from patchfem.export import run_folder
 from patchfem.export.folder import is_state_file
 from patchfem.runs import refine
+from patchfem.runs.run import hash_run
+from patchfem.scene.keys.tables import Tables
+from patchfem.scene.keys.types import list_inner_tables, list_keys
 from patchfem.time_steps import checkpoint, time_march
 
+FILE_KEYS = [
+    f"{table}.{key.name}"
+    for table, model in list_inner_tables(Tables).items()
+    for key in list_keys(model).values()
+    if key.names_file
+]
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
 SHORT_DRIVE = DRIVE.replace("cycles = 30", "cycles = 12.3071")
 RIGS = {
@@ -239,3 +249,34 @@ def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
     run_successfully("run", scene, "--no-page", "-q", "-o", out, "--resume")
     assert list_names(tmp_path) == {"scene.toml", "out"}
     assert os.path.getsize(out / "result.nc") > 10_000
+
+
+@pytest.mark.parametrize("key", FILE_KEYS)
+def test_hash_of_run_changes_with_every_named_file(tmp_path, key):
+    """A run has the same hash until a file changes that its scene names; other files of its folder do not matter."""
+    table, _, name = key.rpartition(".")
+    source = SimpleNamespace(
+        path=tmp_path / "scene.toml", resolved=f'title = "a"\n[{table}]\n{name} = "data.csv"\n'
+    )
+    model = SimpleNamespace(source=source)
+    hashes = []
+    for content, other in (("1", "1"), ("1", "2"), ("2", "2")):
+        (tmp_path / "data.csv").write_text(content)
+        (tmp_path / "other.csv").write_text(other)
+        hashes.append(hash_run(model, None, "1"))
+    assert hashes[0] == hashes[1] != hashes[2]
+
+
+def test_refuses_to_resume_complete_run_with_older_files(tmp_path):
+    """A complete run is printed again only if the files of its scene have not changed since."""
+    table = tmp_path / "measured.csv"
+    table.write_text("frequency [Hz],input [g],acceleration [g]\n143,5,4\n")
+    scene = tmp_path / "scene.toml"
+    scene.write_text(RIGS["one slide"] + '[measured]\nfile = "measured.csv"\n')
+    command = ("run", scene, "--no-page", "-o", tmp_path / "out")
+    run_successfully(*command)
+    assert "already complete" in run_successfully(*command, "--resume").err
+    end = (tmp_path / "out/summary.json").stat().st_mtime
+    os.utime(table, (end + 1, end + 1))
+    answer = run_cli(*command, "--resume")
+    assert answer.code == 2 and "a file that the scene names has changed" in answer.err

@@ -4,10 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core import Measure
+
 CURVE_METHODS = ("balance", "quasi-static")  # methods, the recommended one first
 ROUND_OFF_ERROR = 1e-9  # Relative round-off error of a computed value.
 EQUAL_AMPLITUDE_TOL = 1e-7  # Amplitudes with a smaller relative difference count as equal.
 CURVE_QUANTITIES = ("frequency", "damping", "force")  # values of a curve that have an error
+CURVE_UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1", "force": "N"}
 
 
 class Curve(NamedTuple):
@@ -43,6 +46,20 @@ class Curve(NamedTuple):
     def at(self, points) -> "Curve":
         """Return the curve at selected points, given by bools (k,), indices or a slice."""
         return Curve(*(column[points] for column in self))
+
+    def get_measure(self, name: str, k: int) -> Measure:
+        """Return the value and the error of one of CURVE_QUANTITIES at point k."""
+        value = float(getattr(self, name)[k])
+        return Measure(value, CURVE_UNITS[name], float(getattr(self, f"{name}_error")[k]))
+
+    def list_measures(self) -> dict[str, Measure]:
+        """Return frequency, damping ratio and force at both ends of the curve and the largest damping ratio, by name."""
+        measures = {}
+        for name in CURVE_QUANTITIES:
+            measures[f"{name}_at_smallest_amplitude"] = self.get_measure(name, 0)
+            measures[f"{name}_at_largest_amplitude"] = self.get_measure(name, -1)
+        largest = int(np.argmax(self.damping))
+        return measures | {"largest_damping": self.get_measure("damping", largest)}
 
     def interpolate(self, amplitudes) -> dict[str, np.ndarray]:
         """Interpolate the values linearly at amplitudes (k,) [m]; return a dict by name."""

@@ -11,9 +11,9 @@ import numpy as np
 
 from ...campaigns.sweeps.changes import MAIN_MEASURES
 from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
-from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES
+from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MAX_TRUSTED_RELATIVE_ERROR
 from ..answer import Answer, Answers, Variables
-from ..quantities import format_value
+from ..quantities import VALUE_ROUND_OFF, format_value
 from ..rows import Chart
 from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
 
@@ -46,12 +46,35 @@ class SweepView(NamedTuple):
         """Whether the cases are all combinations of the values of the keys."""
         return self.data[self.axis].dims == (self.axis,)
 
+    def read_values(self, name: str) -> np.ndarray:
+        """Return the values of a variable, of which those of the size of round-off are 0."""
+        values = self.data[name].values
+        if values.dtype.kind != "f":
+            return values
+        sizes = np.abs(values)
+        largest = sizes[np.isfinite(sizes)].max(initial=0.0)
+        return np.where(sizes <= VALUE_ROUND_OFF * largest, 0.0, values)
+
     def split_lines(self, name: str) -> np.ndarray:
         """Return a variable as (lines, values of the key on the axis)."""
-        variable = self.data[name]
-        place = variable.dims.index(self.axis) if self.others else 0
-        moved = np.moveaxis(variable.values, place, -1)
+        place = self.data[name].dims.index(self.axis) if self.others else 0
+        moved = np.moveaxis(self.read_values(name), place, -1)
         return moved.reshape(-1, moved.shape[-1])
+
+    def split_measure(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return a measure and its error as (lines, values).
+
+        Steady estimates stand in place of the values of cases that did not settle, where statements on the sweep use them.
+        """
+        values = self.split_lines(name)
+        errors = self.split_lines(f"{name}_error")
+        if f"{name}_steady" not in self.data:
+            return values, errors
+        steady = self.split_lines(f"{name}_steady")
+        steady_errors = self.split_lines(f"{name}_steady_error")
+        is_used = self.find_symbols() == "x"
+        is_used = is_used & (steady_errors <= MAX_TRUSTED_RELATIVE_ERROR * np.abs(steady))
+        return np.where(is_used, steady, values), np.where(is_used, steady_errors, errors)
 
     def find_symbols(self) -> np.ndarray:
         """Return the symbol of each case (lines, values): "circle", or "x" if the case did not settle.
@@ -79,7 +102,7 @@ class SweepView(NamedTuple):
 
         `min_ratio` is the ratio of its values at which the axis is logarithmic.
         """
-        values = self.data[name].values
+        values = self.read_values(name)
         if values.dtype.kind != "f":
             return Axis(name.replace("_", " ")), values.astype(str)
         finite = values[np.isfinite(values)]
@@ -139,7 +162,7 @@ def make_relative(answers: Answers, chart: Chart) -> Panel | None:
         for name in (*MAIN_MEASURES, *chart.y.split()):
             if name not in answer.data:
                 continue
-            values = view.split_lines(name).ravel()
+            values = view.split_measure(name)[0].ravel()
             if values.size > 1 and abs(values[0]) > 0:  # False for NaN
                 keep = select_curve_points(values, MAX_DRAWN_CASES // 2)
                 label = join_names(title, name.replace("_", " "))
@@ -195,8 +218,7 @@ def make_measure_panel(answers: Answers, name: str) -> Panel:
         axes = axes or (x_axis, view.scale(name, MIN_LOG_AXIS_MEASURE_RATIO)[0])
 
         # the interval of a quantity without negative values does not reach below zero
-        values = view.split_lines(name) * axes[1].scale
-        errors = view.split_lines(f"{name}_error") * axes[1].scale
+        values, errors = (part * axes[1].scale for part in view.split_measure(name))
         least = 0.0 if np.nanmin(values, initial=0.0) >= 0 else -np.inf
         symbols = np.broadcast_to(view.find_symbols(), values.shape)
         arrays = (values, np.maximum(values - errors, least), values + errors, symbols)

@@ -97,7 +97,10 @@ def make_stress_panels(path: Path) -> list[Panel]:
         )
         for time, values in zip(elapsed, stress, strict=True)
     ]
-    caption = "The colours are the same in all frames; t begins at the first one; the interface is at y = 0."
+    caption = (
+        "Stress around the contact, or around the largest pressure of a long contact; the interface is at y = 0. The "
+        "colours are the same in all frames; t begins at the first one."
+    )
     return [Panel(title, "film", x_axis, y_axis, curves, caption, colour_label=colours.unit)]
 
 

@@ -82,21 +82,18 @@ def _list_numbers(numbers: np.ndarray, number_format: str, part: slice) -> list[
     return ["" if value != value else number_format % value for value in values]
 
 
-def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path: Path) -> None:
+def write_csv(columns: Sequence[CsvColumn], n_cases: int, path: Path) -> None:
     """Write sweep.csv.
 
     Parameters
     ----------
-    cases : Cases
-        Values of the keys in each case.
-    table : SweepTable
-        Measures and outcome of each case.
-    case_folders : sequence of str
-        Folders of the cases; empty if there are none.
+    columns : sequence of CsvColumn
+        Columns, as `list_columns` returns them.
+    n_cases : int
+        Number of their rows.
     path : Path
         File to write.
     """
-    columns = list_columns(cases, table, case_folders)
 
     def make_rows(first: int) -> Iterator[tuple[str, ...]]:
         """Return the rows of a part of the cases, because the cells of all cases would fill the memory."""
@@ -104,5 +101,5 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
         return zip(*(column.list_cells(part) for column in columns), strict=True)
 
     header = [column.heading for column in columns]
-    parts = map(make_rows, range(0, len(table), N_ROWS_PER_PART))
+    parts = map(make_rows, range(0, n_cases, N_ROWS_PER_PART))
     write_rows(path, chain([header], chain.from_iterable(parts)))

@@ -19,7 +19,7 @@ from .. import page as pages
 from .. import store as answers
 from ..answer import Answer
 from .answer import identify_sweep, make_sweep_answer, read_tolerance
-from .csv_columns import write_csv
+from .csv_columns import list_columns, write_csv
 from .folder import Folder, Writer
 
 MAX_CASES_WITH_SUMMARY = 1000  # cases whose summaries are stored by default
@@ -189,7 +189,8 @@ def write_tables(
     names = folder.list_case_folder_names()
     # Cases of which sweep.csv is written without --collect
     if is_collected or len(table) <= 200_000:
-        write_csv(cases, table, names, folder.target / "sweep.csv")
+        columns = list_columns(cases, table, names)
+        write_csv(columns, len(cases), folder.target / "sweep.csv")
     answers.write_answer(make_sweep_answer(sweep_scene, cases, table, names), folder.target)
     del table  # its memory is needed for the page, which is made from the files
     if page:

@@ -19,9 +19,9 @@ from ...core import Compliance, ContactState, Outcome, PatchfemError, frozen_arr
 from ...exceptions import UnresolvedTrace
 from ...model.patch import PatchModel
 from ..results.patch_rows import Arrays, Measures, Values
+from . import skin
 from .cases import Cases, GapShapes, make_cases, make_gap_shapes
 from .condensed import CondensedPair
-from .skin import make_skin_law
 
 
 class Surface(NamedTuple):
@@ -107,7 +107,7 @@ class Level:
         if not self.is_smooth or self.tangent is not None:
             return None
         area = self.area.sum()
-        return SmoothLayer(self.area, lambda load: make_skin_law(self.model, load / area))
+        return SmoothLayer(self.area, lambda load: skin.make_skin_law(self.model, load / area))
 
     def linearise(self, tangent: np.ndarray) -> "Level":
         """Return the pieces with a smooth asperity layer of a tangent compliance (m,) [m/N], without gap shapes."""

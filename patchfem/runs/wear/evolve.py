@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, array_dataclass, frozen_array
+from ...model import layer_heights
 from ...model.patch import PatchPiece
 from ...model.wear import interpolate_nodes
 from ...time_steps.checkpoint import RETRY_ADVICE, read_state, write_state
+from ...wear import rough_layer
 from ...wear.depth import Press, wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
-from ...wear.rough_layer import RoughLayer, make_rough_layer, make_rough_press
 from ..patch import area
 from ..patch.measures import with_static_measures
 from ..patch.press import (
@@ -82,7 +83,7 @@ class WornPatch:
     depths: tuple[np.ndarray, ...]
     seconds: float
     stopped: str
-    layer: RoughLayer | None = None
+    layer: "rough_layer.RoughLayer | None" = None
 
 
 # State of the wear after the last jump, and the history of all jumps
@@ -395,7 +396,7 @@ def _list_axes(patch) -> tuple[np.ndarray, ...]:
     return (patch.x,) if patch.model.area is None else (cells.y, cells.x)
 
 
-def solve_worn(patch, worn, layer: RoughLayer | None = None):
+def solve_worn(patch, worn, layer: "rough_layer.RoughLayer | None" = None):
     """Solve the contact of a patch again on its mesh or cells, with a worn depth (m,) [m] added to its unworn gap.
 
     Tops of a rough layer that wears lose more height than this depth, so that the gap under load opens further; the
@@ -420,7 +421,7 @@ def solve_worn(patch, worn, layer: RoughLayer | None = None):
     return replace(pressed, unloaded_gap=frozen_array(pressed.unloaded_gap - opening + worn))
 
 
-def find_rough_layer(model, patch) -> RoughLayer | None:
+def find_rough_layer(model, patch) -> "rough_layer.RoughLayer | None":
     """Return the rough layer of a patch that wears, with the tops that the load has pressed flat; None without one.
 
     Parameters
@@ -433,15 +434,13 @@ def find_rough_layer(model, patch) -> RoughLayer | None:
     skin = model.patch.interface.skin
     if skin is None or skin.hardness is None:
         return None
-    # Filters of traces and scans are imported for such a layer only.
-    from ...model.layer_heights import read_layer_heights
-
     pressure = patch.normal_stress
     force = pressure * patch.pieces.interface.weight
     is_upper = model.patch.gap.side == "upper"
     share = model.wear.upper_share if is_upper else 1 - model.wear.upper_share
     mean_pressure = float(force @ pressure / force.sum()) if force.any() else 0.0
-    return make_rough_layer(read_layer_heights(model.patch), skin.hardness, mean_pressure, share)
+    heights = layer_heights.read_layer_heights(model.patch)
+    return rough_layer.make_rough_layer(heights, skin.hardness, mean_pressure, share)
 
 
 def compute_values(patch) -> Values:
@@ -451,16 +450,16 @@ def compute_values(patch) -> Values:
     return compute_static_values(patch)
 
 
-def _make_force_function(patch, layer: RoughLayer | None) -> Press:
+def _make_force_function(patch, layer: "rough_layer.RoughLayer | None") -> Press:
     """Return the contact forces [N] of a patch as a function of worn depth and softening; `layer` is one that wears."""
     if patch.model.area is not None:
         press = area.make_force_function(patch)
     else:
         press = make_contact_force_function(patch.model, patch.pair)
-    return press if layer is None else make_rough_press(press, layer)
+    return press if layer is None else rough_layer.make_rough_press(press, layer)
 
 
-def compute_worn_values(patch, depth, layer: RoughLayer | None = None) -> Values:
+def compute_worn_values(patch, depth, layer: "rough_layer.RoughLayer | None" = None) -> Values:
     """Return worn volume, worn depth, and what a rough layer has lost, by the names of their measures, in SI units.
 
     Parameters
