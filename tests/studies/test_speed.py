@@ -19,7 +19,7 @@ study = make_study_fixture("speed/speed.py")
     ],
 )
 def test_always_sweeps_have_rate_and_reach_tolerance(name, fraction, study):
-    """A sweep has a rate, and most of its cases meet the tolerance with all of their measures."""
+    """A sweep has a rate, and most of its cases meet the tolerance with their main measures."""
     row = study.measure_sweep(name, 0.064, 3)
     assert row.name == name and row.value > 0 and fraction < row.other <= 100
 
