@@ -19,6 +19,7 @@ from ..core import Measure, NotConverged, PatchfemError
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
+from ..runs.patch import store
 from ..runs.plan import plan
 from ..runs.refine import is_main
 from ..runs.run import run as run_plan
@@ -121,7 +122,8 @@ class Subject(NamedTuple):
 
 def solve_run(model: Model) -> SolvedSetting:
     """Run a model; the pieces are condensed again instead of being loaded from the cache."""
-    result = run_plan(plan(model), fresh=True)
+    store.clear_cache()
+    result = run_plan(plan(model))
     advice = [finding.advice for finding in result.findings if finding.advice is not None]
     return SolvedSetting(
         measures=result.measures,
@@ -284,7 +286,7 @@ def _measure_cpu_time() -> float:
 
 
 def _run_setting(setting: Setting, say: Callable | None, subject: Subject) -> SolvedSetting | None:
-    """Solve a `subject` with a numerical setting; return None if it does not converge or runs out of memory.
+    """Compute a Subject with one numerical setting; return None if it does not converge or runs out of memory.
 
     `say` is called with the reason of a failure.
     """

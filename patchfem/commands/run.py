@@ -6,6 +6,7 @@ from pathlib import Path
 from .. import core
 from ..export import run_folder, store
 from ..runs import plan
+from ..runs.patch.store import clear_cache
 from .shared import (
     DEFAULT_OUTPUT,
     NOT_CONVERGED_EXIT_CODE,
@@ -53,6 +54,8 @@ def run(
         _report_complete_run(target, output)
         return
 
+    if fresh:
+        clear_cache()
     report = None if output.quiet else print_message
     with Progress(output.quiet or output.json_) as progress:
         written = run_folder.run_into(
@@ -60,7 +63,6 @@ def run(
             target,
             report,
             progress,
-            fresh=fresh,
             resume=resume,
             has_page=not output.no_page,
         )

@@ -310,7 +310,7 @@ class Progress:
 
     def __enter__(self) -> "Progress":
         if not self.is_silent:
-            # Without memory for another thread the run goes on without the elapsed time, and reports its own error.
+            # A run that may not start a thread, under a limit of memory, goes on without showing the elapsed time.
             with suppress(RuntimeError):
                 Thread(target=self._show_elapsed_time, daemon=True).start()
         return self

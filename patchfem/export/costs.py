@@ -21,6 +21,7 @@ from ..formatting import format_number
 from ..model.model import Model
 from ..runs.joint import find_source
 from ..runs.refine import is_main
+from ..runs.rig.engines import MAX_RELATIVE_STEP_ERROR, STEP_ERROR_RATIO
 from . import quantities
 from .answer import (
     Answer,
@@ -40,8 +41,8 @@ SUFFICIENT_TOLERANCES = {"for_1_percent": 1e-2, "for_1_permille": 1e-3}
 # Note on a motion from event to event without a mesh
 TOLERANCE_CARRIES_ERROR_NOTE = (
     "No mesh and no number of steps carries the error of this motion, but the tolerance of its steps from event to event: "
-    "1e-5 times accuracy.tolerance, at most 1e-8. Expected is an order of about 1 in accuracy.tolerance below 0.001, and no "
-    "change above it."
+    f"{STEP_ERROR_RATIO:g} times accuracy.tolerance, at most {MAX_RELATIVE_STEP_ERROR:g}. Expected is an order of about 1 "
+    f"in accuracy.tolerance below {MAX_RELATIVE_STEP_ERROR / STEP_ERROR_RATIO:g}, and no change above it."
 )
 MINUTE = 60.0  # CPU seconds
 MIN_GROWTH = (

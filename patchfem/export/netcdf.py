@@ -1,22 +1,19 @@
-"""Arrays of an answer as a netCDF4 file with CF attributes, written and read by h5py without xarray.
+"""Arrays of an answer as a netCDF4 file with CF attributes, written and read by h5netcdf without xarray.
 
-The import of xarray takes longer than most runs, so only `to_dataset` imports it. h5py writes and reads the many small
-variables of a sweep four times as fast as h5netcdf. In a netCDF4 file a dimension is a dimension scale of HDF5: the
-variable of its name, or a dataset without values.
+The import of xarray takes longer than most runs, so only `to_dataset` imports it.
 """
 
 import json
 from collections.abc import Mapping
 from pathlib import Path
 
+import h5netcdf
 import h5py
 import numpy as np
 
 from ..disk.atomic_write import open_lossy, write_atomically
 from .answer import Answer, Variable, Variables
 
-# Name of the dimension scale of a dimension without a coordinate, which its length follows (netCDF4 file format)
-NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable."
 # attributes of a file or of a variable by name
 Attributes = dict[str, str | float | list[str] | np.ndarray]
 
@@ -78,53 +75,30 @@ def write_arrays(data: Variables, attributes: Attributes, path: Path) -> None:
     with (
         write_atomically(path) as partial,
         open_lossy(partial) as opened,
-        h5py.File(opened, "w", track_order=True) as file,
+        h5py.File(opened, "w", track_order=True) as store,
+        h5netcdf.File(store, "w") as file,
     ):
-        versions = f"version=2,hdf5={h5py.version.hdf5_version},h5py={h5py.__version__}"
-        file.attrs["_NCProperties"] = np.bytes_(versions)
         file.attrs.update(attributes)
         for name, variable in data.items():
             _write_variable(file, name, variable)
-        _attach_dimensions(file, data)
 
 
-def _write_variable(file: h5py.File, name: str, variable: Variable) -> None:
-    """Write one variable without its dimensions."""
+def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:
+    """Write one variable, and the dimensions that the file does not have yet."""
     values = np.asarray(variable.values)
+    for dimension, size in zip(variable.dims, values.shape, strict=True):
+        if dimension not in file.dimensions:
+            file.dimensions[dimension] = size
+
     has_strings = values.dtype.kind in "UO"
     options = {"fillvalue": np.nan} if values.dtype.kind == "f" else {}
     # Arrays with fewer values are stored without compression
     if values.size >= 100:
         options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
     kind = h5py.string_dtype() if has_strings else values.dtype
-    content = values.astype(object) if has_strings else values
-    stored = file.create_dataset(name, values.shape, kind, content, track_order=True, **options)
-    if "fillvalue" in options:
-        stored.attrs["_FillValue"] = np.full(1, np.nan, values.dtype)
+    stored = file.create_variable(name, variable.dims, kind, **options)
+    stored[...] = values.astype(object) if has_strings else values
     stored.attrs.update(make_variable_attributes(name, variable))
-
-
-def _attach_dimensions(file: h5py.File, data: Variables) -> None:
-    """Make the dimensions of the variables of a file, and attach each variable to its dimensions."""
-    scales = {}
-    for variable in data.values():
-        for dimension, size in zip(variable.dims, np.shape(variable.values), strict=True):
-            if dimension in scales:
-                continue
-            if dimension in data:
-                scale = file[dimension]
-                scale.make_scale(dimension)
-            else:
-                scale = file.create_dataset(dimension, (size,), ">f4")
-                scale.make_scale(f"{NO_COORDINATE}{size:10d}")
-            scale.attrs["_Netcdf4Dimid"] = np.int32(len(scales))
-            scales[dimension] = scale
-
-    for name, variable in data.items():
-        if name not in scales:
-            axes = file[name].dims
-            for axis, dimension in enumerate(variable.dims):
-                axes[axis].attach_scale(scales[dimension])
 
 
 def read_netcdf(path: Path) -> tuple[Variables, Attributes]:
@@ -133,9 +107,11 @@ def read_netcdf(path: Path) -> tuple[Variables, Attributes]:
     Dimensions without a coordinate have no variable. OSError if the file cannot be read or is not a netCDF4 file.
     """
     data = {}
+    # h5py reads the many small variables of a sweep three times as fast as h5netcdf, which also leaves a traceback on the
+    # screen where it cannot open a damaged file
     with h5py.File(path, "r", track_order=True) as file:
         for name, stored in file.items():
-            if bytes(stored.attrs.get("NAME", b"")).startswith(NO_COORDINATE.encode()):
+            if bytes(stored.attrs.get("NAME", b"")).startswith(b"This is a netCDF dimension"):
                 continue
             dims = (name,) if stored.is_scale else tuple(axis[0].name[1:] for axis in stored.dims)
             is_text = stored.dtype.kind == "O"

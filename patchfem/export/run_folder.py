@@ -40,7 +40,6 @@ def run_into(
     report: Callable[[str], None] | None = None,
     progress: Callable[[float], None] | None = None,
     *,
-    fresh: bool = False,
     resume: bool = False,
     has_page: bool = True,
 ) -> WrittenRun:
@@ -58,8 +57,6 @@ def run_into(
         Results folder.
     report, progress : callable, optional
         Functions that take a line of text and the completed fraction.
-    fresh : bool
-        Whether the pieces are condensed again instead of being read from the cache.
     resume : bool
         Whether to continue from the saved state.
     has_page : bool
@@ -79,7 +76,7 @@ def run_into(
         if saves_state(run_plan):
             state_file = StateFile(folder.path / WEAR_STATE_FILE, __version__, resume)
         try:
-            result = run(run_plan, report, progress, fresh=fresh, state_file=state_file)
+            result = run(run_plan, report, progress, state_file=state_file)
         except NotConverged as error:
             result = _extract_partial_result(error)
         answer = write_results(result, folder.path)

@@ -21,7 +21,7 @@ from .run_words import list_readings, make_verdict
 
 # ratio of a stiffness to its error above which the loss factor is computed
 MIN_STIFFNESS_TO_ERROR = 10.0
-RECORDED_PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5py", "matplotlib")
+RECORDED_PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
 def make_run_answer(result: Result) -> Answer:

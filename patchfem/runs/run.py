@@ -20,7 +20,7 @@ from ..model.model import Model
 from ..model.source import Source, locate_errors
 from . import joint, refine
 from .findings import find_missed_measures, mark_unbalanced
-from .patch import area_motion, case_meshes, faces, store, strength
+from .patch import area_motion, case_meshes, faces, strength
 from .patch import result as patch_result
 from .plan import Plan, plan, refuse_first_case, refuse_insufficient_memory
 from .results.interfaces import PressedFace, merge_sentences
@@ -67,8 +67,9 @@ def run(
     say=None,
     progress=None,
     estimate: bool = True,
-    fresh: bool = False,
     state_file: StateFile | None = None,
+    *,
+    tells_passes: bool = True,
 ) -> Result:
     """Run a Plan, or plan and run a Scene or a Model.
 
@@ -82,10 +83,10 @@ def run(
         Callback for the completed fraction of all runs.
     estimate : bool
         Whether to estimate the errors from coarser runs; if False, the errors are None.
-    fresh : bool
-        Whether to condense the pieces without using cached compliance matrices.
     state_file : StateFile, optional
         File in which the state of a run with [wear] or of a long march is saved.
+    tells_passes : bool
+        Whether `say` is called when the run is repeated. A sweep does not tell this of its cases.
 
     Returns
     -------
@@ -104,15 +105,14 @@ def run(
     with locate_errors(runnable.model.source):
         refuse_first_case(runnable)
         refuse_insufficient_memory(runnable, say)
-        if fresh:
-            store.clear_cache()
 
         start = process_time()
         max_seconds = runnable.model.accuracy.max_seconds or refine.DEFAULT_MAX_SECONDS
         max_bytes = runnable.model.accuracy.max_memory or refine.DEFAULT_MAX_BYTES
         limit = refine.RunLimit(max_seconds, measure_cpu_time(), bytes=max_bytes)
         passes = _Passes(runnable, refine.RunControl(limit, say, progress, estimate), state_file)
-        done, shortage = refine.refine(passes.solve, runnable.model, passes.judge, limit, say)
+        tell = say if tells_passes else None
+        done, shortage = refine.refine(passes.solve, runnable.model, passes.judge, limit, tell)
         if shortage is not None:
             done = done._replace(result=done.result.with_changes(shortage=shortage))
         done.result.seconds["total"] = process_time() - start

@@ -773,8 +773,8 @@ def find_event(system, level, drive):
     if is_found and not is_last:
         return True
 
-    # Ports that creep stop with the port that has reversed, because one motion of the modes may move both. The forces that
-    # hold all ports at rest are known after the step.
+    # Ports that creep stop with the port that has reversed, because one motion of the modes may move both. No port is
+    # released in this step: the forces of the ports that stop are known only in the next one.
     for block in range(points.blocks.law.size if is_found else 0):
         speed = points.memory[block, 0] * moves[Port.END_VELOCITY, points.blocks.port[block]]
         if points.blocks.law[block] == Law.COULOMB and speed < find_creep(system, block):

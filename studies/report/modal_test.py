@@ -89,7 +89,10 @@ def march_samples(scene, drive=None, steps: int = STEPS, seconds: float | None =
     contact = make_contact(model, choose_numerics(model), patch)
     # 1e-6 compensates round-off, so that a whole number of cycles is not reduced by one
     cycles = int((seconds or drive.duration) / drive.period + 1e-6)
-    return march(modes, drive, contact, cycles, steps, window=cycles).window
+    motion = march(modes, drive, contact, cycles, steps, window=cycles)
+    if motion.outcome is not None:
+        raise RuntimeError(motion.message)
+    return motion.window
 
 
 def follow_events(scene, drive, seconds: float):

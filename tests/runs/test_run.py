@@ -170,7 +170,7 @@ def test_always_shipped_scenes_load_and_plan(path):
 def test_refuses_run_beyond_memory_limit_in_one_line(tmp_path):
     """A run beyond the memory limit of its process ends with exit code 4 and a message of one line."""
     (tmp_path / "a.toml").write_text(POINT + COULOMB + STRUCTURE)
-    limit = 135 << 20
+    limit = 150 << 20
     process = subprocess.run(
         [sys.executable, "-m", "patchfem", "run", tmp_path / "a.toml", "-o", tmp_path / "out"],
         timeout=120,

@@ -15,7 +15,7 @@ from .joint import build_joint
 N_AMPLITUDES = 5  # number of points of each curve, so that its time is that of a few motions
 # Settings of a run that change a backbone; the others are those of its drive
 BACKBONE_SETTINGS = ("element_size", "cells")
-# Note on what is computed
+# Sentence for the user on the runs; {span} is the range of amplitudes
 NOTE = (
     "Each run is the backbone of the first mode at five amplitudes, {span}. Its motions have steps of the same tolerance in "
     "all runs, so that the mesh of a patch carries the error; without a patch all runs are equal."

@@ -258,7 +258,7 @@ def _make_curves(
     x_values = _as_floats(data[own_x_name]) * axes[0].scale
     values = _as_floats(data[name])
     bands = _find_band(data, name)
-    # The dimension in front of the name of a measure, as in wear_worn_depth_max, says nothing in a legend.
+    # All lines of such a chart are of the wear, so that a legend omits the prefix of their names, as in wear_worn_depth_max.
     labels = [name.removeprefix("wear_").replace("_", " ")]
     first = data[name].dims[0] if values.ndim == 2 else ""
     if first in ("interface", "case"):

@@ -25,7 +25,7 @@ class Joint(NamedTuple):
 
 @njit(**NJIT_KERNEL)
 def read_strip(strips, k):
-    """Return the `Strip` of number k in the array `strips` (capacity, 14)."""
+    """Return the `Strip` of number k from its row in the array `strips` (capacity, 14)."""
     row = strips[k]
     return Strip(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7])
 

@@ -48,7 +48,8 @@ def solve(
         try:
             if isinstance(model, PatchfemError):
                 raise model
-            result = run(replace(plan(model), draws_curve=on_result is not None), report)
+            case_plan = replace(plan(model), draws_curve=on_result is not None)
+            result = run(case_plan, report, tells_passes=False)
             if on_result is not None:
                 on_result(case, result)
         except FAILED_CASE_ERRORS as error:

@@ -188,7 +188,8 @@ def solve_with_coarser(
             patches = with_static_measures(patches, tolerance)
         return (*patches, *[None] * (grids.MIN_NESTED_MESHES - len(patches)))
 
-    # Many runs of a rig or of a bench have the same patch. That of a bench has large factors, so that only one stays.
+    # Runs of a rig or of a bench that have the same patch take it from the store. The factors of a fine mesh need much
+    # memory, so that only the last of such patches stays there.
     key = ("patches", store.content_key(patch_model), tolerance, with_errors)
     return store.get_or_compute(key, solve, is_large=patch_model.mesh.is_fine)
 

@@ -22,6 +22,10 @@ from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ..bench import engine as bench_engine
 from ..bench.engine import MIN_RELATIVE_STEP_ERROR, Numerics, SpaceSettings
 
+# Tolerance of a step from event to event, relative to the tolerance of the run, and its largest value
+STEP_ERROR_RATIO = 1e-5
+MAX_RELATIVE_STEP_ERROR = 1e-8
+
 
 class Engine(NamedTuple):
     """Method that computes a motion.
@@ -223,7 +227,8 @@ def choose_numerics(model: Model, engine: Engine | None = None) -> Numerics:
     if engine is EVENT_DRIVEN:
         # A rig without friction needs few steps. Otherwise the error per step is a small part of the tolerance.
         steps = event_driven.cases.MIN_STEPS
-        local = float(np.clip(1e-5 * accuracy.tolerance, MIN_RELATIVE_STEP_ERROR, 1e-8))
+        step_error = STEP_ERROR_RATIO * accuracy.tolerance
+        local = float(np.clip(step_error, MIN_RELATIVE_STEP_ERROR, MAX_RELATIVE_STEP_ERROR))
         if accuracy.method == "exact" or model.friction is None:
             local = event_driven.cases.EXACT_RTOL
     elif engine is MARCH and accuracy.steps_per_cycle is None:
