@@ -2,7 +2,7 @@
 
 See items.md in this folder, which this script writes.
 
-Of 79 items 68 work, 8 in part, one is missing, and of two there is nothing to compute. The verdict is on this program:
+Of 79 items 68 work, 8 in part, one cannot be computed, and of two there is nothing to compute. The verdict is on this program:
 whether the report itself is right an item's study says. Paths are those of the repository.
 
 Run: python studies/report/items.py
@@ -20,7 +20,7 @@ VERDICT_TEXTS = {"nothing": "nothing to compute"}
 VERDICTS = {
     "works": "work",
     "in part": "work in part",
-    "missing": "are missing",
+    "missing": "cannot be computed",
     "nothing": "have nothing to compute",
 }
 

@@ -1,18 +1,21 @@
 """Smallest or largest value of a measure inside the range of a swept key, and where it lies.
 
 It is the vertex of the parabola through the extreme case and its neighbours, over the logarithm of a key whose values are
-spaced by factors. A vertex that differs from the extreme case by more than EXTREME_BAND is not resolved by the cases: the
-extreme is then that case, and lies somewhere between its neighbours.
+spaced by factors. A vertex whose error exceeds EXTREME_BAND is not resolved by the cases: the extreme is then that case,
+and lies somewhere between its neighbours.
 """
 
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import BarycentricInterpolator
 
 from .sweep_table import SweepTable
 
 EXTREME_BAND = 0.05  # relative distance from an extreme value that is commonly called negligible
+# Error of a vertex over its distance from other estimates, which contains 95 % of the errors of smooth skew curves.
+VERTEX_SAFETY = 2
 
 
 class Extreme(NamedTuple):
@@ -24,8 +27,8 @@ class Extreme(NamedTuple):
         Names of measure and key, and unit of the key.
     is_largest : bool
         Whether it is the largest value, and not the smallest one.
-    value : float
-        Value of the measure.
+    value, error : float
+        Value of the measure, and its estimated error.
     place : float
         Value of the key.
     interval : tuple of float
@@ -40,6 +43,7 @@ class Extreme(NamedTuple):
     unit: str
     is_largest: bool
     value: float
+    error: float
     place: float
     interval: tuple[float, float]
     band: tuple[float, float] | None
@@ -86,9 +90,10 @@ def find_extreme(table: SweepTable, name: str) -> Extreme | None:
         return None
 
     place, value = _find_vertex(x[top - 1 : top + 2], y[top - 1 : top + 2])
+    value_error = _estimate_error(x, y, error, top, place, value)
     ends = _find_interval(x, y, error, top)
     band = _find_band(x, y, place, value)
-    if abs(value - y[top]) > EXTREME_BAND * abs(y[top]):
+    if value_error > EXTREME_BAND * abs(y[top]):
         place = x[top]
         value = float(y[top])
         ends = (x[top - 1], x[top + 1])
@@ -100,6 +105,7 @@ def find_extreme(table: SweepTable, name: str) -> Extreme | None:
         unit=key.unit,
         is_largest=top_sign > 0,
         value=value,
+        error=value_error,
         place=float(to_key(place)),
         interval=(float(to_key(ends[0])), float(to_key(ends[1]))),
         band=None if band is None else (float(to_key(band[0])), float(to_key(band[1]))),
@@ -119,6 +125,30 @@ def _find_vertex(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
         if left <= place <= right:
             return place, float(y[0] + (place - left) * (slope + curvature * (place - middle)))
     return middle, float(y[1])
+
+
+def _estimate_error(
+    x: np.ndarray, y: np.ndarray, error: np.ndarray, top: int, place: float, value: float
+) -> float:
+    """Return the error of the value of a vertex.
+
+    It is VERTEX_SAFETY times the distance of the vertex from the extreme case or from the parabola through this case and two
+    others on one side of it, of which the nearer one counts, and the largest error of the three cases of the vertex.
+
+    Parameters
+    ----------
+    x, y, error : (m,) array
+        Places, values and errors of the cases, x increasing.
+    top : int
+        Index of the extreme case.
+    place, value : float
+        Place and value of the vertex.
+    """
+    sides = [slice(first, first + 3) for first in (top - 2, top) if 0 <= first <= x.size - 3]
+    parabolas = [BarycentricInterpolator(x[cases], y[cases]) for cases in sides]
+    from_sides = min((abs(value - parabola(place)) for parabola in parabolas), default=0.0)
+    distance = max(abs(value - y[top]), from_sides)
+    return float(VERTEX_SAFETY * distance + error[top - 1 : top + 2].max())
 
 
 def _find_interval(

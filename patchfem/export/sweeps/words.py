@@ -105,8 +105,7 @@ def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRa
                 continue
             numbers = (extreme.place, *extreme.band)
             place, begin, end = (format_value(one, extreme.unit) for one in numbers)
-            error = errors[extreme.is_largest]
-            value = _format_measure(name, column.unit, extreme.value, error)
+            value = _format_measure(name, column.unit, extreme.value, extreme.error)
             words += f" ({side}, {value}, at {place}, {first} to {last}; within 5 % of it from {begin} to {end})"
     return words
 
