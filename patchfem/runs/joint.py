@@ -267,8 +267,11 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
         return add_edge_springs(patch.slip_compliance, patch.pressure.sigma_n > 0, stiffness)
 
     def excess(log_factor: float) -> float:
-        """Return the relative excess of the stiffness for a scaled compliance."""
-        return compute_stick_stiffness(patch, np.exp(log_factor), bond_length) / stiffness - 1
+        """Return the logarithm of the ratio of the stiffness for a scaled compliance to the wanted one.
+
+        Over the logarithm of the factor it is nearly a straight line.
+        """
+        return np.log(compute_stick_stiffness(patch, np.exp(log_factor), bond_length) / stiffness)
 
     if not excess(-MAX_LOG_COMPLIANCE_FACTOR) > 0 > excess(MAX_LOG_COMPLIANCE_FACTOR):
         return patch.slip_compliance
@@ -276,9 +279,8 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
     # scipy.optimize takes half a second to import, and most joints have no bonds.
     from scipy.optimize import brentq
 
-    factor = np.exp(
-        brentq(excess, -MAX_LOG_COMPLIANCE_FACTOR, MAX_LOG_COMPLIANCE_FACTOR, xtol=1e-14)
-    )
+    ends = -MAX_LOG_COMPLIANCE_FACTOR, MAX_LOG_COMPLIANCE_FACTOR
+    factor = np.exp(brentq(excess, *ends, xtol=1e-12))
     if not is_plane:
         return patch.slip_compliance.scale(factor)
     return frozen_array(factor * patch.slip_compliance)
