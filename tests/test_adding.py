@@ -139,6 +139,7 @@ def marched_folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_added_law_of_exponent_one_agrees_with_dahl_under_effect(marched_folder, effect):
     """By time steps the added law with n = 1 has the loop of Dahl's law, that of LuGre without damping."""
@@ -150,6 +151,7 @@ def test_added_law_of_exponent_one_agrees_with_dahl_under_effect(marched_folder,
         assert abs(found[name]["value"] - other[name]["value"]) <= error, name
 
 
+@pytest.mark.long
 def test_sweep_of_added_law_agrees_with_single_run(marched_folder):
     """A sweep of the added law has the loop area of the single run."""
     areas = xarray.load_dataset(marched_folder / "sweep/sweep.nc").loop_area.values

@@ -102,6 +102,7 @@ def parallel_results(shared_cache, package):
     return sorted(results, key=lambda one: not one["numba"])
 
 
+@pytest.mark.long
 def test_exact_only_first_of_two_processes_compiles(parallel_results):
     """Of two processes started at once on an empty cache, only one compiles, and both give the same loop."""
     assert [one["numba"] for one in parallel_results] == [True, False]

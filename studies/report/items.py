@@ -2,8 +2,8 @@
 
 See items.md in this folder, which this script writes.
 
-Of 79 items 68 work, 8 in part, one cannot be computed, and of two there is nothing to compute. The verdict is on this program:
-whether the report itself is right an item's study says. Paths are those of the repository.
+Of 79 items 68 work, 8 in part, one cannot be computed, and of two there is nothing to compute. The verdict is on this
+program: whether the report itself is right an item's study says. Paths are those of the repository.
 
 Run: python studies/report/items.py
 """

@@ -335,6 +335,7 @@ static = 0.3
 )
 
 
+@pytest.mark.long
 def test_always_errors_of_micro_slip_include_the_mesh():
     """The errors in micro-slip cover the difference from a finer mesh at 95 % of the amplitudes.
 
@@ -366,6 +367,7 @@ def test_always_errors_of_micro_slip_include_the_mesh():
     assert coarse.exponents.micro is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("slide", [1.0, 0.01])
 def test_default_amplitudes_end_where_mode_is_nearly_free(slide):
     """The default amplitudes end where the frequency is within 5 % of the free one.
@@ -428,6 +430,7 @@ def test_quasi_static_curve_ends_at_maximum_force():
     assert backbone.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
 
 
+@pytest.mark.long
 def test_backbone_of_a_face_states_the_subtracted_joint():
     """The scene in SI of a bench over a face has the stiffness that was subtracted from the modes, as a number."""
     keys = {"contact.area.cells": 32, "slide.amplitude": "1 um"}

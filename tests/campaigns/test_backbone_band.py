@@ -39,6 +39,7 @@ def both_curves():
     return pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES)
 
 
+@pytest.mark.long
 def test_exact_modes_as_argument_and_in_scene_give_same_curves(both_curves):
     """Modes given as an argument and modes in the scene of a rig give the same curve within 1e-9.
 

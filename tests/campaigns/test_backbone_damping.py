@@ -67,6 +67,7 @@ def test_exact_viscous_damping_adds_to_friction_damping(law):
     assert negative.damping == pytest.approx(expected, abs=1e-7)
 
 
+@pytest.mark.long
 def test_amplitude_of_largest_damping_contains_the_peak_of_a_finer_grid():
     """The interval of this amplitude contains the peak between the grid points; without a peak there is none.
 
@@ -88,6 +89,7 @@ def test_amplitude_of_largest_damping_contains_the_peak_of_a_finer_grid():
     assert end.value == 3e-4 and end.low is None
 
 
+@pytest.mark.long
 @pytest.mark.share(0)
 @pytest.mark.parametrize("law", LAWS)
 def test_damping_is_zero_at_limit_cycle_of_a_run(law, tmp_path):

@@ -64,6 +64,7 @@ def test_force_holds_the_amplitude_in_a_run(scene):
     assert (shift < 1e-3).all() if scene is JOINT else (shift > 1e-3).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "slide, second, amplitudes, is_known",
     [
@@ -147,6 +148,7 @@ def test_force_of_rigid_friction_agrees_with_energy():
     assert 0 < error < 1e-2 * expected
 
 
+@pytest.mark.long
 def test_amplitudes_of_forces_have_these_forces():
     """Amplitudes of given forces have these forces within the tolerance, also beyond the default range."""
     forces = [0.01, 5.0, 100.0]
@@ -157,6 +159,7 @@ def test_amplitudes_of_forces_have_these_forces():
     assert curve.balance_amplitude.values[0] == pytest.approx(0.01 / stuck, rel=1e-4)
 
 
+@pytest.mark.long
 def test_default_amplitudes_follow_the_damping():
     """Between neighbouring default amplitudes the damping ratio changes by at most 15 % of its range."""
     damping = pf.backbone(JOINT, method="balance").balance_damping.values
@@ -181,6 +184,7 @@ def solve_one_harmonic(load: float, amplitude: float) -> tuple[float, float]:
     return omega / (2 * np.pi), damping
 
 
+@pytest.mark.long
 def test_preloads_on_one_page_agree_with_closed_form(tmp_path, monkeypatch):
     """Three preloads give curves in one table and page that agree with equivalent linearization within 0.2 %.
 

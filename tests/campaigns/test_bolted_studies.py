@@ -120,6 +120,7 @@ def test_exact_modes_given_beside_the_scene_keep_their_slide():
     assert free[1] == pytest.approx(free[0], rel=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["quasi_static", "balance"])
 def test_always_errors_of_assumed_slides_include_the_stiffness_of_the_joint(method):
     """Coarse and fine meshes agree within their errors, and on each the joint has a tenth of the stiffness of the mode."""
@@ -257,10 +258,8 @@ SWEEPS = {
     "kind",
     [
         "cases",
-        "sobol",
-        "table",
-        "pairs",
         "set",
+        *(pytest.param(kind, marks=pytest.mark.long) for kind in ("sobol", "table", "pairs")),
         *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("over", "random")),
     ],
 )
@@ -373,6 +372,7 @@ def test_fitted_scene_subtracts_the_joint_of_the_fit(tmp_path: Path, monkeypatch
     assert fitted["balance_frequency"].values == pytest.approx(columns[1], rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("joint", ["1.5 um", "0.01 um"])
 def test_always_default_amplitudes_resolve_the_onset_of_slip(joint: str):
     """Frequency and damping ratio change by at most 8 % of their range between neighbouring default amplitudes."""

@@ -217,6 +217,7 @@ def test_refuses_fewer_values_than_parameters(tmp_path):
         pf.fit(IWAN, to=path, free=free)
 
 
+@pytest.mark.long
 def test_assumed_errors_are_the_scatter_around_the_fit_by_balance(tmp_path):
     """Errors that the table does not give are two standard deviations of the residual of the reported fit.
 

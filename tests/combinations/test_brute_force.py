@@ -263,7 +263,12 @@ SUPPORTED = {
         ("coulomb", "convolution", "elastic-plastic", "bouc-wen"),
     ),
 }
-CASES = [(name, law) for name, row in SUPPORTED.items() for law in row[2]]
+LONG = {("grooves and cubic spring", "tanh")}  # cases that .ci/run runs
+CASES = [
+    pytest.param(name, law, marks=pytest.mark.long if (name, law) in LONG else ())
+    for name, row in SUPPORTED.items()
+    for law in row[2]
+]
 
 
 @pytest.mark.parametrize("name, law", CASES)

@@ -219,7 +219,12 @@ def test_stiffness_under_an_approach_has_the_loop_of_the_load():
         )
 
 
-COMBINATIONS = [(effect, law) for effect in EFFECTS for law in LAWS]
+LONG = {("lower", "order 2"), ("pitch", "order 2")}  # combinations that .ci/run runs
+COMBINATIONS = [
+    pytest.param(effect, law, marks=pytest.mark.long if (effect, law) in LONG else ())
+    for effect in EFFECTS
+    for law in LAWS
+]
 
 
 @pytest.mark.parametrize("effect, law", COMBINATIONS)

@@ -63,6 +63,7 @@ def test_exact_given_shift_is_used(trace_pair):
     assert run_cli(*words).content["reference"] != "place"
 
 
+@pytest.mark.long
 def test_exact_scene_is_pressed_with_both_surfaces(trace_pair, tmp_path):
     """compare --scene has the measures of single runs with each trace, and a chart of both pressures."""
     scene = tmp_path / "scene.toml"

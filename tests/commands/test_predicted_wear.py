@@ -119,6 +119,7 @@ def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp
     assert "Computed and measured wear" in page
 
 
+@pytest.mark.long
 def test_wear_coefficient_follows_run_history(crowned_run, tmp_path):
     """The coefficient for a wear state inside the history of the run agrees within 2e-3.
 
@@ -145,6 +146,7 @@ def test_wear_coefficient_follows_run_history(crowned_run, tmp_path):
         pf.compare(files[0], deep_trace, shift=0.0, predicted=crowned_run)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share, scatter", [(0.5, 0.0), (0.5, 0.3), (1.0, 0.3)])
 def test_tells_a_wrong_share_from_scatter(crowned_run, tmp_path, share, scatter):
     """A depth of half the share has another shape, and scatter by 30 % over short waves has not.

@@ -59,6 +59,7 @@ def compute_stiffnesses(block, active):
 # ---- stiffness against elements without waves
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "block, count, tolerance",
     [
@@ -83,6 +84,7 @@ def test_flat_block_agrees_with_hexahedra(block, count, tolerance):
         assert 0 <= expected / high - 1 <= tolerance, direction
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [3, pytest.param(5, marks=pytest.mark.slow)])
 def test_roll_agrees_with_hexahedra(count):
     """The stiffnesses of the strip that touches under a roll of .1 mrad agree with elements within 8e-3.
@@ -356,6 +358,7 @@ def test_exact_rigid_cells_on_a_spring_share_its_force():
     assert shear_modes(rigid, limit.ravel(), 4).stiffness.size == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("finer", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_finer_bricks_keep_partial_slip(finer):
     """Finer bricks of the free sides change the force at half of gross slip by 2e-4, the stiffness by 1e-3."""

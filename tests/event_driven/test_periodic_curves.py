@@ -95,6 +95,7 @@ def test_continuation_ends_with_count_of_steps():
         shooting.relax(10)
 
 
+@pytest.mark.long
 def test_closed_curve_ends_after_one_turn(curve_of_levels):
     """At 160 Hz the level of the motions has a maximum L over their amplitude. Under the level (0.99 + p^2) L their curve
     over p is closed: it is followed once, and turns back where the level is L, at p = 0.1 and at p = -0.1."""

@@ -97,6 +97,7 @@ def test_always_peak_that_may_lie_at_a_coated_side_has_no_value(cells, is_coated
         assert "free side" in peak.reason
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "law, work",
     [(COULOMB, 2.460e-3), ({"law": "nonlocal", "static": 0.3, "bond_length": "1 um"}, 1.890e-3)],

@@ -53,6 +53,7 @@ def test_exact_peak_of_stuck_damper_agrees_with_receptance():
     assert abs(frequency.value - reference.x) <= frequency.error < 1e-2
 
 
+@pytest.mark.long
 def test_peak_of_sweep_case_agrees_with_drawn_curve():
     """Random dampers, whose peaks a sweep finds without their curves, have the peaks of the runs that draw them, within both
     errors. At 3 kN the highest motions rise above a curve that sticks. The last one has the law of Iwan."""
@@ -83,6 +84,7 @@ def test_exact_peak_at_a_kink_of_the_curve():
     assert amplitude < reference and reference - amplitude < error < 1e-4 * reference
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("load, frequency", [("264 N", 380.7), ("272 N", 384.6)])
 def test_highest_of_two_maxima_is_found(load, frequency):
     """Near its optimum a damper with the law of Iwan has two maxima; neither run nor sweep takes the lower one.
@@ -102,6 +104,7 @@ def test_highest_of_two_maxima_is_found(load, frequency):
     assert peak.value == pytest.approx(motion.value, rel=1e-3)
 
 
+@pytest.mark.long
 def test_peak_of_sweep_case_of_many_elements_agrees_with_drawn_curve():
     """A joint that slips part by part has the same peak in a sweep and in the run that draws its curve."""
     text = read_template("beam").replace("slide = 0.01 ", "slide = 0.012 ")

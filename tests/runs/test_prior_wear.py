@@ -131,6 +131,7 @@ def worn_face(tmp_path_factory):
     return folder, whole.measures["worn_depth_max"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cells", [32, 48])
 def test_worn_face_continues_on_its_own_and_on_other_cells(worn_face, cells):
     """Two halves of the wear of a face agree with the whole run, and with Archard's volume k N s, within their errors."""

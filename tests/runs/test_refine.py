@@ -76,6 +76,7 @@ def find_excess(result) -> float:
     return max(one.error_ratio(tolerance) for name, one in measures if name in MAIN_MEASURES)
 
 
+@pytest.mark.long
 def test_exact_beam_is_refined_until_its_loop_meets_the_tolerance():
     """The template `beam` misses its tolerance on the first mesh. With more time it meets it, and agrees with the coarse
     run within both errors; the warning of the coarse run names the time that the next pass needs.

@@ -79,6 +79,7 @@ def list_misses(result, reference) -> list[str]:
     ]
 
 
+@pytest.mark.long
 def test_exact_worn_layer_keeps_the_volume_and_loses_its_tops(folder):
     """The worn volume is kappa N s n to round-off; tops lose more than the mean depth, and touch where heights are cut.
 
@@ -107,6 +108,7 @@ def test_exact_layer_that_is_pressed_flat_wears_as_a_smooth_face(folder):
         assert flat[name].value == pytest.approx(old[name].value, rel=1e-9)
 
 
+@pytest.mark.long
 def test_always_errors_of_worn_layer_hold(folder):
     """Values at a tolerance of 3 % differ from those at 0.3 % by less than the errors of both."""
     coarse, fine = (run_layer(folder, HARD + FILE, tolerance=value) for value in (3e-2, 3e-3))
@@ -132,6 +134,7 @@ def test_exact_deepest_tops_lose_the_heights_above_their_level(folder):
     assert measures["touching_fraction"].value == pytest.approx(np.mean(heights > level), abs=2e-3)
 
 
+@pytest.mark.long
 def test_exact_split_trace_and_scan_give_the_heights(folder):
     """The short waves of the profile, and an areal scan beside [contact.area], are heights of a layer that wears."""
     profile = '[contact.profile]\nfile = "long.csv"\nheights = "surface"\n'
@@ -149,6 +152,7 @@ def test_exact_split_trace_and_scan_give_the_heights(folder):
         assert 0 < measures["touching_fraction"].value < 1
 
 
+@pytest.mark.long
 def test_run_continues_and_compares(folder, tmp_path):
     """Two halves of a run agree with the whole, and `compare` gives the mean depth between them."""
     whole = run_layer(folder, HARD + FILE)

@@ -27,6 +27,7 @@ NAMES = (
 
 
 # The joints and the chain take several seconds each.
+@pytest.mark.long
 @pytest.mark.share(0, 1)
 @pytest.mark.parametrize("name", SCENES)
 def test_always_errors_of_random_scene_cover_fine_results(name):

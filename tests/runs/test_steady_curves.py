@@ -83,6 +83,7 @@ INTERLOCK = (
 SINE = '[drive]\nkind = "base"\nfrequency = "{} Hz"\nacceleration = "5 g"\ncycles = {}\n'
 
 
+@pytest.mark.long
 def test_always_unstable_steady_state_is_not_converged():
     """At 200 Hz the only steady state is unstable, and a march does not settle; the outcome is
     not_converged."""
@@ -91,6 +92,7 @@ def test_always_unstable_steady_state_is_not_converged():
     assert any("is unstable" in warning and "march" in warning for warning in result.warnings)
 
 
+@pytest.mark.long
 def test_exact_number_of_steady_motions_is_stated():
     """Near 160 Hz a stiffening rig has three steady motions. For the unstable one of them the smallest stable one
     is shown, and a note says how many are stable. If the search for the others fails, it is shown itself."""
@@ -188,6 +190,7 @@ IWAN_MODES = (
 )
 
 
+@pytest.mark.long
 def test_exact_curve_of_iwan_law_with_five_modes_agrees_with_march():
     """The curve has the amplitudes of a march of 300 cycles at its ends and at its peak within the error of the march, which
     is below 3e-5 as its law has fewer cells; all of it is stable, and the motion from which it starts is near the origin:

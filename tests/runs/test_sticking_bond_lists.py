@@ -66,6 +66,7 @@ tolerance = 0.01
 """
 
 
+@pytest.mark.long
 @pytest.mark.share(0)
 @pytest.mark.parametrize(
     "text",

@@ -37,6 +37,7 @@ def rough_scene(tmp_path_factory):
     return folder / "scene.toml"
 
 
+@pytest.mark.long
 def test_exact_sweep_of_rough_profile_agrees_with_run(rough_scene):
     """The measures and errors of a sweep agree with those of the run. On a mesh shared by all cases
     the peak was less than half of that of the run."""

@@ -97,6 +97,7 @@ def test_exact_bands_move_in_two_modes_with_yaw():
     assert measures["equivalent_damping"].value is None
 
 
+@pytest.mark.long
 def test_wear_of_bands_that_slip_part_by_part_tends_to_that_without_yaw():
     """The worn depth of a face that slips part by part hardly changes with a yaw that vanishes, and does with another."""
     wear = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1e3\njumps = 1\n[accuracy]\ntolerance = 1e-2\n'

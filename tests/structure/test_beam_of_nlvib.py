@@ -92,6 +92,7 @@ def run_beam(folder, omega: float, speed: float):
     return pf.run(folder / "beam.toml").measures["relative_displacement_amplitude"]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not (FOLDER and FILE.is_file()), reason="PATCHFEM_DATA has no nlvib-beam.mat")
 @pytest.mark.parametrize("omega, approximate", [(110.0, 5.20919e-7), (123.4, 1.752136e-6)])
 def test_exact_beam_amplitude_agrees_with_harmonic_balance(tmp_path, omega, approximate):
@@ -105,6 +106,7 @@ def test_exact_beam_amplitude_agrees_with_harmonic_balance(tmp_path, omega, appr
     np.testing.assert_allclose(reference, approximate, rtol=2e-6)
 
 
+@pytest.mark.long
 @pytest.mark.share(1)
 @pytest.mark.skipif(not (FOLDER and FILE.is_file()), reason="PATCHFEM_DATA has no nlvib-beam.mat")
 @pytest.mark.parametrize("omega", [193.0, 300.0])

@@ -187,6 +187,7 @@ def test_exact_separated_pieces_have_no_force():
         assert created[-1] <= 1e-3 * stored.max()
 
 
+@pytest.mark.long
 @given(
     st.sampled_from(["plastic", "bonds", "growing"]),
     st.integers(0, 10**6),

@@ -129,6 +129,7 @@ def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind
     assert not any(is_state_file(path.name) for path in out.iterdir())
 
 
+@pytest.mark.long
 def test_exact_run_is_resumed_in_its_second_pass(tmp_path, save_counter, monkeypatch):
     """A run that is repeated with finer meshes goes on in the pass that was interrupted."""
     monkeypatch.setattr(refine, "is_main", lambda name: name == "energy_dissipated")

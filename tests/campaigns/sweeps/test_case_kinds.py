@@ -173,14 +173,22 @@ def compare_kind(kind: str, n: int, n_compared: int | None = None) -> list[float
     return ratios
 
 
-@pytest.mark.parametrize("kind", FAST)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=pytest.mark.long if kind == "table" else ()) for kind in FAST]
+)
 def test_always_some_cases_agree_with_single_runs(kind, tmp_path, monkeypatch):
     """Values are within the sum of both errors, the outcome is the same, and a case that misses its tolerance says why."""
     monkeypatch.chdir(tmp_path)
     assert max(compare_kind(kind, 4)) <= 1
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    "law",
+    [
+        pytest.param(law, marks=pytest.mark.long if place % 2 else ())
+        for place, law in enumerate(LAWS)
+    ],
+)
 def test_always_points_of_a_law_agree_with_single_runs(law, tmp_path, monkeypatch):
     """The values of the first of many points, which are marched together, lie within the sum of both errors."""
     monkeypatch.chdir(tmp_path)

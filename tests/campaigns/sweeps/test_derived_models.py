@@ -145,6 +145,7 @@ def random_cases(seed: int, count: int):
             count -= 1
 
 
+@pytest.mark.long
 @pytest.mark.share(0, 4)
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_derived_models_equal_models_built_from_text(name):

@@ -74,6 +74,7 @@ def test_exact_killed_worker_loses_one_case(tmp_path, support_on_path, once):
     assert_only_killing_case_fails(tmp_path, once, Pool(2))
 
 
+@pytest.mark.long
 def test_exact_death_of_process_loses_its_chunk_only(tmp_path, support_on_path):
     """A process that dies loses its own chunk, at most one new process takes its place, and other child processes live on.
 
@@ -167,6 +168,7 @@ def assert_resumes_to_same_files(whole_sweep: tuple, out: Path) -> None:
     assert list_names(out / "cases") == list_names(expected / "cases")
 
 
+@pytest.mark.long
 def test_exact_killed_sweep_resumes_to_same_files(whole_sweep, tmp_path):
     """A sweep that is killed can be resumed to the same files."""
     path, over, _ = whole_sweep

@@ -110,6 +110,7 @@ def test_always_verdict_on_curves_names_the_peak_amplitude():
     assert "before friction force" not in verdict
 
 
+@pytest.mark.long
 def test_sweep_of_curves_shows_peaks_and_warns_at_ends(tmp_path):
     """The screen shows amplitude and frequency of each peak, and warns of those at an end of the range."""
     scene = tmp_path / "block.toml"

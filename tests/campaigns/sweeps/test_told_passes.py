@@ -1,5 +1,7 @@
 """What a sweep tells of its cases while they run."""
 
+import pytest
+
 import patchfem as pf
 
 JOINT = """
@@ -25,6 +27,7 @@ tolerance = 2e-3
 """
 
 
+@pytest.mark.long
 def test_always_sweep_does_not_tell_of_passes_of_its_cases(capsys):
     """A run says that it is repeated on a finer mesh; a sweep does not say so of its cases, which it does not name."""
     pf.run(JOINT)

@@ -425,6 +425,7 @@ def test_refuses_short_traces():
         compare_surfaces(*short)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shape", ["flat", "round"])
 def test_always_floor_of_noisy_track_has_no_bias(shape):
     """Over 12 noisy tracks, the mean error of the floor is within .8 of its scatter; the largest of the means is above."""
