@@ -8,7 +8,7 @@ import numpy as np
 from .extremes import Extreme, find_extreme
 from .limits import CHANGE_AT_LIMIT, KeyLimit, find_limits
 from .peaks import PeakOnLine, find_peaks
-from .ranking import SobolIndex, compute_quantiles, rank_keys
+from .ranking import Quantile, SobolIndex, compute_quantiles, rank_keys
 from .sweep_table import SweepTable
 
 # Measures whose change over a sweep is compared, the most important first.
@@ -63,7 +63,7 @@ class SweepAnalysis:
     limits: list[KeyLimit]
     peaks: list[PeakOnLine]
     ranking: dict[str, list[SobolIndex]]
-    quantiles: dict[str, np.ndarray]
+    quantiles: dict[str, list[Quantile]]
 
 
 def analyse(table: SweepTable) -> SweepAnalysis:

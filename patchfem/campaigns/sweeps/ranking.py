@@ -208,8 +208,16 @@ def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
     return np.atleast_2d(indices.first_order), np.atleast_2d(indices.total_order)
 
 
-def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
-    """Return the quantiles of QUANTILE_PROBABILITIES [SI] of each ranked measure of a table of random cases.
+class Quantile(NamedTuple):
+    """Quantile [SI] of random cases, and its 95 % interval, of which an end is NaN if too few cases bound it."""
+
+    value: float
+    low: float
+    high: float
+
+
+def compute_quantiles(table: SweepTable) -> dict[str, list[Quantile]]:
+    """Return the quantiles of QUANTILE_PROBABILITIES of each ranked measure of a table of random cases.
 
     Measures of which fewer than 90 % of the cases have a settled value have none, because the others may be the extreme
     ones.
@@ -224,5 +232,16 @@ def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
             values = table.measures[name].values
             counts = np.isfinite(values) & settled
             if counts.mean() >= MIN_FRACTION_OF_KNOWN_CASES:
-                quantiles[name] = np.quantile(values[counts], QUANTILE_PROBABILITIES)
+                quantiles[name] = [
+                    _find_quantile(values[counts], one) for one in QUANTILE_PROBABILITIES
+                ]
     return quantiles
+
+
+def _find_quantile(values: np.ndarray, probability: float) -> Quantile:
+    """Return a quantile of values (n,), with the interval that follows from the binomial distribution of their ranks."""
+    from scipy.stats import quantile_test
+
+    interval = quantile_test(values, p=probability).confidence_interval(0.95)
+    value = np.quantile(values, probability)
+    return Quantile(float(value), float(interval.low), float(interval.high))

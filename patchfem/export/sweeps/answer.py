@@ -96,9 +96,12 @@ def _make_details(table: SweepTable, analysis: SweepAnalysis) -> JsonObject:
         peaks.append(row | make_peak_quantities(table, entry))
     quantiles = []
     for name, values in analysis.quantiles.items():
-        ends = zip(("low", "median", "high"), values, strict=True)
         unit = table.measures[name].unit
-        quantiles.append({"measure": name} | {end: Quantity(one, unit) for end, one in ends})
+        row = {"measure": name}
+        for place, one in zip(("low", "median", "high"), values, strict=True):
+            low, high = (end if np.isfinite(end) else None for end in (one.low, one.high))
+            row[place] = Quantity(one.value, unit, low=low, high=high)
+        quantiles.append(row)
 
     tolerance = np.ravel(table.tolerance)
     return {

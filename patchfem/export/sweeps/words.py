@@ -5,7 +5,7 @@ import numpy as np
 from ...campaigns.sweeps.changes import MAIN_MEASURES, MeasureRange, SweepAnalysis
 from ...campaigns.sweeps.limits import DOUBLED_VALUE_CHANGE, KeyLimit
 from ...campaigns.sweeps.peaks import FREQUENCY_KEY, PeakOnLine
-from ...campaigns.sweeps.ranking import SobolIndex
+from ...campaigns.sweeps.ranking import Quantile, SobolIndex
 from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Outcome
 from ...measures import rows
@@ -26,9 +26,10 @@ def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
             sentences.append(_describe_ranking(name, indices))
         for name, values in list(analysis.quantiles.items())[:1]:
             unit = table.measures[name].unit
-            low, median, high = (_format_measure(name, unit, value) for value in values)
+            low, median, high = (_describe_quantile(name, unit, one) for one in values)
             sentences.append(
-                f"90 % of the cases have a {_name_in_words(name)} of {low} to {high}, with the median {median}."
+                f"90 % of the cases have a {_name_in_words(name)} of {low} to {high}, with the median {median}; "
+                "brackets contain the 95 % interval due to the number of cases."
             )
     elif analysis.peaks:
         sentences.append(_describe_peaks(table, analysis.peaks))
@@ -108,6 +109,14 @@ def _describe_range(table: SweepTable, analysis: SweepAnalysis, entry: MeasureRa
             value = _format_measure(name, column.unit, extreme.value, extreme.error)
             words += f" ({side}, {value}, at {place}, {first} to {last}; within 5 % of it from {begin} to {end})"
     return words
+
+
+def _describe_quantile(name: str, unit: str, quantile: Quantile) -> str:
+    """Return a quantile of a measure with its interval, of which one end may be unknown."""
+    value, *ends = (_format_measure(name, unit, one) if one == one else "" for one in quantile)
+    low, high = ends
+    interval = f"{low} to {high}" if low and high else f"above {low}" if low else f"below {high}"
+    return f"{value} ({interval})" if low or high else value
 
 
 def _name_in_words(name: str) -> str:
