@@ -18,7 +18,7 @@ FINITE_DIFFERENCE_STEP = 1e-5  # step of finite differences, relative to the ran
 # Predicted relative decrease of the sum of squares by a step, below which a descent has converged; that by the round-off of
 # differences is smaller
 COST_TOL = 1e-10
-MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
+MAX_DESCENT_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
 # Ratio of the decrease of the sum of squares to the predicted one, below which the next steps are shorter
 MIN_DECREASE_RATIO = 0.25
 # Largest distance of a point from a known minimum that a descent has reached, relative to the ranges, and largest relative
@@ -291,7 +291,7 @@ def descend(model: UnitCubeResidual, u, known: Sequence[Descent] = ()) -> Descen
     # Largest change of a parameter in the first step, relative to its range
     trust = 0.3
     is_converged = False
-    for _ in range(MAX_EVALUATIONS):
+    for _ in range(MAX_DESCENT_EVALUATIONS):
         # the bounded linear problem predicts the sum of squares after the step
         factor = linear.compress()
         found = lsq_linear(factor[:, :-1], -factor[:, -1], linear.limit(trust), method="bvls")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core import Outcome
-from .descent import MAX_EVALUATIONS
+from .descent import MAX_DESCENT_EVALUATIONS
 from .least_squares import Fit
 
 
@@ -70,7 +70,7 @@ def describe_fit(fit: Fit, names: Sequence[str], bounds: Sequence[tuple[str, str
 
     if fit.outcome is Outcome.NOT_CONVERGED:
         sentences.append(
-            f"not converged: the best search did not settle within {MAX_EVALUATIONS} evaluations, and no search from "
+            f"not converged: the best search did not settle within {MAX_DESCENT_EVALUATIONS} evaluations, and no search from "
             "another start ended within 1 % of the best score"
         )
     return sentences

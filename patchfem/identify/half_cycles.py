@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..measures.decay_curve import HalfCycles, smooth_slopes
-from .sinusoids import MAX_EVALUATIONS, START_TOL, SinusoidProblem
+from .sinusoids import MAX_SINUSOID_EVALUATIONS, START_TOL, SinusoidProblem
 
 MIN_HALF_CYCLE_SAMPLES = 5  # smallest number of samples in a half cycle
 # Smallest relative standard deviation of the midpoint (relative to the half period) and the size of a half cycle,
@@ -160,7 +160,7 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     bounds = tuple(np.array([ratio * omega, rate]) for ratio, rate in FIRST_CYCLE_BOUNDS)
     record = (time[is_first] - time[0], value[is_first])
     problem = SinusoidProblem(*record, [np.ones(record[0].size)], bounds=bounds)
-    cycle = problem.refine([[omega, 0.0]], MAX_EVALUATIONS, START_TOL)
+    cycle = problem.refine([[omega, 0.0]], MAX_SINUSOID_EVALUATIONS, START_TOL)
     cosine, sine = cycle.coefficients[0]
 
     # A half cycle goes from peak to peak around a zero of the sinusoid, and must lie completely in the record.
