@@ -70,8 +70,8 @@ def describe_fit(fit: Fit, names: Sequence[str], bounds: Sequence[tuple[str, str
 
     if fit.outcome is Outcome.NOT_CONVERGED:
         sentences.append(
-            f"not converged: the best search did not settle within {MAX_DESCENT_EVALUATIONS} evaluations, and no search from "
-            "another start ended within 1 % of the best score"
+            f"not converged: the best search did not settle within {MAX_DESCENT_EVALUATIONS} evaluations, and no search "
+            "from another start ended within 1 % of the best score"
         )
     return sentences
 
