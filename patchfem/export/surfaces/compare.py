@@ -182,7 +182,7 @@ def _make_data(comparison: Comparison) -> Variables:
     else:
         data = make_variables("surface", x=curves.x, before=heights[0], after=heights[1])
         data |= make_band("depth", curves.depth, HALF_WIDTH_95 * curves.noise)
-        state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3))
+        state = np.select((curves.masks.unworn, curves.masks.worn, curves.masks.grown), (1, 2, 3))
         data |= make_variables("surface", state=state)
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)
 

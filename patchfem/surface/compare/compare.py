@@ -243,7 +243,7 @@ def _measure(
     spans = find_spans(depths) if is_trace else []
     covered = _cover_loss(depths, spans)
     area, error = depths.integrate(covered)
-    is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
+    is_grown = _enlarge(depths.masks.grown) & depths.masks.inside & ~depths.masks.worn
     grown, grown_error = depths.integrate(is_grown, -1.0)
     is_placed = placement.basis == "place"
     # The flanks of a track were compared with random traces, which choose their deepest place too.
@@ -255,7 +255,7 @@ def _measure(
     lowest = max(area - HALF_WIDTH_95 * error, sharp - HALF_WIDTH_95 * sharp_error, 0.0)
     highest = max(area + HALF_WIDTH_95 * error + depths.measure_hidden(covered), sharp)
     loss = name_quantity(names.lost, largest, lowest, highest)
-    sure_area = depths.integrate(depths.worn)[0]
+    sure_area = depths.integrate(depths.masks.worn)[0]
     code = judge_change(largest, drift, sure_loss, sure_area, grown, grown_error)
     if not is_placed and code != "worn":
         code = "elsewhere"
@@ -363,7 +363,7 @@ def _collect_findings(
     # The noise of the depths contains the drift; that of neighbours does not.
     drift = depths.errors.drift
     short_noise = _measure_short_noise(depths)
-    first, last = depths.x[depths.worn][[0, -1]] if not is_placed else (0.0, 0.0)
+    first, last = depths.x[depths.masks.worn][[0, -1]] if not is_placed else (0.0, 0.0)
     rows = (
         (
             not is_placed and tracks,
@@ -397,7 +397,7 @@ def _is_broken(depths: DepthMap, span: tuple[int, int], fraction: float) -> bool
 
     `span` are the first and the last sample of the track in `depths`.
     """
-    return bool(depths.worn[span[0] : span[1] + 1].mean() < fraction)
+    return bool(depths.masks.worn[span[0] : span[1] + 1].mean() < fraction)
 
 
 def _enlarge(part) -> np.ndarray:
@@ -411,14 +411,14 @@ def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
     `spans` are first and last sample of each track of a trace. Grown heights are left out.
     """
     if depths.depth.ndim > 1:
-        return _enlarge(depths.worn) & depths.inside & ~depths.grown
+        return _enlarge(depths.masks.worn) & depths.masks.inside & ~depths.masks.grown
     covered = np.zeros(depths.depth.size, bool)
     for span in spans:
         margin = get_margin(span)
         covered[max(span[0] - margin, 0) : span[1] + margin + 1] = True
     # New roughness that stands above the first surface is no loss, nor is a spike.
     is_near = np.abs(depths.depth) < 2 * UNWORN_LIMIT_DEVIATIONS * depths.noise
-    return covered & (depths.worn | depths.missing | is_near) & ~depths.grown
+    return covered & (depths.masks.worn | depths.masks.missing | is_near) & ~depths.masks.grown
 
 
 def _doubt(
@@ -455,7 +455,7 @@ def _doubt(
     """
     area, grown, bend = sizes
     if code == "grown" and _has_grown_at_ends(depths):
-        height = grown / (float(depths.grown.sum()) * depths.cell)
+        height = grown / (float(depths.masks.grown.sum()) * depths.cell)
         return "growth_at_ends", {"scar_depth": height, "growth_height": height}
     if depths.depth.ndim > 1:
         return code, {}
@@ -510,7 +510,7 @@ def _find_step(depths: DepthMap, *, at_end: bool) -> float:
     """
     depth = depths.depth if at_end else depths.depth[::-1]
     noise = depths.noise if at_end else depths.noise[::-1]
-    is_worn = depths.worn if at_end else depths.worn[::-1]
+    is_worn = depths.masks.worn if at_end else depths.masks.worn[::-1]
     height = float(np.median(depth[is_worn]))
     # The place of least squares: beyond it, each depth is nearer to the height than to 0 on average.
     gain = np.cumsum((depth * height - height**2 / 2)[::-1])
@@ -534,8 +534,8 @@ def _has_grown_at_ends(depths: DepthMap) -> bool:
     axes = set(range(depths.depth.ndim))
     for axis in axes:
         others = tuple(axes - {axis})
-        counts = depths.inside.sum(axis=others)
-        grown = depths.grown.sum(axis=others)[counts > 0] / counts[counts > 0]
+        counts = depths.masks.inside.sum(axis=others)
+        grown = depths.masks.grown.sum(axis=others)[counts > 0] / counts[counts > 0]
         # Fraction of the points of a line near an end above which the end has grown
         if max(grown[:N_END_LINES].max(), grown[-N_END_LINES:].max()) > 0.5:
             return True
@@ -564,8 +564,8 @@ def _measure_share(depths: DepthMap) -> Quantity:
     The half-width of its interval is one line of points around the worn places.
     """
     cell = depths.cell
-    share = float(depths.worn.sum()) * cell / depths.size
-    edge = float(ndimage.binary_dilation(depths.worn).sum()) * cell / depths.size - share
+    share = float(depths.masks.worn.sum()) * cell / depths.size
+    edge = float(ndimage.binary_dilation(depths.masks.worn).sum()) * cell / depths.size - share
     return name_quantity("worn_share", share, max(share - edge, 0.0), share + edge)
 
 

@@ -119,14 +119,14 @@ def find_tops(depths: DepthMap) -> Tops:
     """
     height = remove_long_waves(depths.before)
     relative = depths.depth / depths.noise
-    is_deep = depths.worn & (relative > UNWORN_LIMIT_DEVIATIONS)
+    is_deep = depths.masks.worn & (relative > UNWORN_LIMIT_DEVIATIONS)
     if not is_deep.any():
         return Tops(np.zeros(0, int), np.zeros(0), is_deep)
     # Quantile of the worn heights above which a height is a top
     is_high = height > np.quantile(height[is_deep], 0.25)
     runs = find_runs(is_high)
     tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
-    tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
+    tops = tops[~depths.masks.missing[tops] & ~depths.masks.worn[tops]]
     # A top is a few samples wide, whose noise is partly independent.
     # Number of samples whose mean depth shows whether a top is worn
     return Tops(tops, ndimage.uniform_filter1d(relative, 3)[tops], is_high)

@@ -60,9 +60,9 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     list of tuple
         (first, last) of each track.
     """
-    changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT_DEVIATIONS * depths.noise)
+    changed = depths.masks.worn | (np.abs(depths.depth) > UNWORN_LIMIT_DEVIATIONS * depths.noise)
     tops = find_tops(depths)
-    spans = find_runs(depths.worn)
+    spans = find_runs(depths.masks.worn)
     k = 0
     while k < len(spans) - 1:
         (first, stop), (start, last) = spans[k : k + 2]
@@ -105,7 +105,7 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     """
     # Pile-up beside a track is no flank; the windows that found the worn samples may reach into it.
     relative = depths.depth / depths.noise
-    relative = np.where(depths.grown | (relative < -UNWORN_LIMIT_DEVIATIONS), 0.0, relative)
+    relative = np.where(depths.masks.grown | (relative < -UNWORN_LIMIT_DEVIATIONS), 0.0, relative)
     middle = (span[0] + span[1]) // 2
     count = relative.size
 
@@ -282,7 +282,7 @@ def measure_track(
     shorter = start.high - start.value + end.value - end.low
     longer = start.value - start.low + end.high - end.value
     if lost is None:
-        area, error = depths.integrate((x >= start.value) & (x <= end.value) & ~depths.grown)
+        area, error = depths.integrate((x >= start.value) & (x <= end.value) & ~depths.masks.grown)
         # The ends are uncertain by the area between the bounds of their intervals.
         for place in (start, end):
             near = depths.integrate((x >= place.low) & (x <= place.high))[0]
@@ -370,7 +370,7 @@ def _measure_pile_up(depths: DepthMap, ends: tuple[End, End], width: float) -> t
     for end, sign in zip(ends, (-1, 1)):
         distance = (depths.x - end.value) * sign
         is_beside = (distance >= 0) & (distance <= width)
-        grown = distance[is_beside & depths.grown]
+        grown = distance[is_beside & depths.masks.grown]
         if not grown.size:
             area, error = depths.integrate(
                 is_beside & (distance <= FLANK_OVER_TRACK_WIDTH * width), -1.0

@@ -154,7 +154,7 @@ def test_curves_are_in_csv_and_netcdf():
     band = float((data.depth_high - data.depth).mean())
     assert band == pytest.approx(1.96 * curves.noise.mean(), rel=1e-3)
     worn = data.state.values == 2  # not used, unworn, worn, grown
-    assert (worn == curves.worn).all()
+    assert (worn == curves.masks.worn).all()
     # a fifth of the heights, each of which stands for 1 of n parts, lie below the material ratio of 80 %
     for side, heights in (("before", curves.before), ("after", curves.after)):
         truth = np.sort(heights)[round(0.2 * heights.size - 0.5)]
