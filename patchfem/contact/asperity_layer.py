@@ -19,15 +19,8 @@ from .asperity_laws import SmoothAsperities
 from .bounded import BoundedProblem
 from .unilateral import compute_balances, describe_residuals, solve
 
-# Largest number of Newton steps; thin layers on rough gaps need up to 40
-MAX_LAYER_NEWTON_STEPS = 60
-LAYER_DIVERGED_MESSAGE = (
-    "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
-    'deviation, or set law = "linear"'
-)
 # Largest relative residual of a solution; rounding errors of steep laws stay below it
 SMOOTH_LAW_RESIDUAL_TOL = 1e-9
-RESIDUAL_REMEDY = "; make the rough layer softer (raise the decay length or the height deviation), or leave the layer out"
 # Largest logarithm of a pressure [Pa] at which the asperity layer counts as untouched
 MAX_UNTOUCHED_LOG_PRESSURE = -300.0
 # Largest logarithm of a force [N] for which products with the exponential function do not overflow
@@ -134,11 +127,12 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
     Raises
     ------
     NotConverged
-        After `MAX_LAYER_NEWTON_STEPS` steps, or if a step cannot be computed.
+        After 60 steps, or if a step cannot be computed.
     """
     contact = problem.contact
     asperities = problem.asperities
-    for _ in range(MAX_LAYER_NEWTON_STEPS):
+    # Thin layers on rough gaps need up to 40 Newton steps
+    for _ in range(60):
         # Forces of the law at the separations, and what they leave of the two equations
         log_pressure, decay = asperities.log_pressure(separation)
         log_force = log_pressure + np.log(problem.area)
@@ -184,7 +178,10 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         # pressure
         risen = asperities.separation(np.array(0.01 * load / problem.area.sum()))
         separation = separation + np.maximum(change, np.minimum(limited_change, risen - separation))
-    raise NotConverged(LAYER_DIVERGED_MESSAGE)
+    raise NotConverged(
+        "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
+        'deviation, or set law = "linear"'
+    )
 
 
 def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
@@ -314,7 +311,10 @@ def press_with_asperities(layer: AsperityProblem) -> AsperitySolution:
     if not all(value <= SMOOTH_LAW_RESIDUAL_TOL for value in residuals.values()):
         raise NotConverged(
             describe_residuals(
-                residuals, SMOOTH_LAW_RESIDUAL_TOL, "contact.asperities", RESIDUAL_REMEDY
+                residuals,
+                SMOOTH_LAW_RESIDUAL_TOL,
+                "contact.asperities",
+                "; make the rough layer softer (raise the decay length or the height deviation), or leave the layer out",
             )
         )
     return solution
