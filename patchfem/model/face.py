@@ -16,8 +16,6 @@ from .gap import ShapedGap
 from .patch import PatchModel
 from .source import cache_by_file, name_key
 
-SCAN_KEY = "contact.profile.scan"
-
 
 def compute_face_gap(patch: PatchModel, x: np.ndarray, y: np.ndarray) -> ShapedGap:
     """Compute the gap of the unloaded faces at equal cells.
@@ -46,7 +44,7 @@ def compute_face_gap(patch: PatchModel, x: np.ndarray, y: np.ndarray) -> ShapedG
 
     # A scan that is larger than the face is cropped, and a smaller one goes on with its last heights.
     begin = process_time()
-    with name_key(SCAN_KEY):
+    with name_key("contact.profile.scan"):
         part = read_face(scan.path, scan.at, patch.pieces.length, patch.pieces.width)
     sign = -1.0 if scan.is_material else 1.0
     measured = sign * average_over_cells(part, x, y)

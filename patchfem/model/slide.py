@@ -20,7 +20,6 @@ STEPS_PER_HOLD = 4
 REFERENCE_STEPS_PER_CYCLE = 400
 # Relative error with REFERENCE_STEPS_PER_CYCLE; it falls with the square of the time step.
 REFERENCE_ERROR = 1e-3
-STEPS_PER_BOND_LENGTH = 20  # number of steps while the slide covers the length of a bond
 MAX_BENCH_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
 MAX_PATH_SAMPLES = 20_000_000  # largest number of samples in a path; more take too much memory
 MAX_SLIDE_SAMPLES = 5_000_000  # largest number of samples in a slide; more take too much memory
@@ -165,9 +164,9 @@ class SlidePath:
             path = float(np.abs(np.diff(legs[1])).sum())
             cycles = max(1.0, path / (2 * float(np.ptp(legs[1]))))
             if length:
-                # Largest number of bond lengths per cycle that STEPS_PER_BOND_LENGTH resolves.
+                # 20 steps resolve the length of a bond, for at most 1000 lengths per cycle
                 bond_lengths = min(path / cycles / length, 1000)
-                per_cycle = max(per_cycle, STEPS_PER_BOND_LENGTH * bond_lengths)
+                per_cycle = max(per_cycle, 20 * bond_lengths)
         # Smallest number of steps per cycle, which resolves the loop at any tolerance.
         per_cycle = min(max(per_cycle, 100), MAX_BENCH_STEPS_PER_CYCLE)
         return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)

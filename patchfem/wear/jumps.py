@@ -8,14 +8,10 @@ import numpy as np
 from ..core import array_dataclass, max_abs
 from .depth import Press, solve_jump, wear_rates
 
-MAX_JUMP_GROWTH = 4.0  # largest ratio of the length of a jump to that of the previous jump
 JUMP_SAFETY_FACTOR = 0.9  # safety factor on the length of a jump that would just meet the tolerance
-FIRST_JUMP_FRACTION = 1e-3  # length of the first automatic jump as a fraction of all cycles
 JUMP_ORDER = 2  # order of the method of `depth.solve_jump`
 # Ratio of the difference between a jump and its two halves to the error of the halves
 RICHARDSON_DIVISOR = 2**JUMP_ORDER - 1
-# Smallest ratio of error to tolerance from which the length of the next jump is computed
-MIN_ERROR_RATIO = 1e-9
 # Smallest depth [m] in a divisor; it keeps quotients finite before anything is worn
 MIN_WORN_DEPTH = 1e-300
 
@@ -93,7 +89,7 @@ def make_initial_wear_state(problem: WearProblem, depth=None) -> WearState:
         force=problem.press(depth, zero),
         path=problem.path(depth),
         trend=zero,
-        length=FIRST_JUMP_FRACTION * problem.cycles,
+        length=1e-3 * problem.cycles,  # of the first automatic jump
         coarse_depth=depth,
         path_error=0.0,
         jump_path=zero,
@@ -153,9 +149,7 @@ def take_jump(
         length *= max(0.2, JUMP_SAFETY_FACTOR * error ** (-1 / (JUMP_ORDER + 1)))
 
     # The error of a method of order p falls with the power p + 1 of the length
-    growth = min(
-        MAX_JUMP_GROWTH, JUMP_SAFETY_FACTOR * max(error, MIN_ERROR_RATIO) ** (-1 / (JUMP_ORDER + 1))
-    )
+    growth = min(4.0, JUMP_SAFETY_FACTOR * max(error, 1e-9) ** (-1 / (JUMP_ORDER + 1)))
     cycle = end if length == remaining else after.cycle
     return replace(after, cycle=cycle, length=length * growth)
 

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-CONSTANT_LENGTH_FLAG = -1.0  # value in place of a_s that marks a constant bond length
-
 
 @dataclass(frozen=True, slots=True)
 class Bonds:
@@ -44,7 +42,7 @@ def growth_numbers(law: Bonds) -> np.ndarray:
     They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m] and eps_k [m], in the order of
     `point_rows_kernels.GROWTH`. Fields of the law may be arrays (c,) of the values of c points.
     """
-    growth = (CONSTANT_LENGTH_FLAG, 1.0, 1.0, law.length, law.length)
+    growth = (-1.0, 1.0, 1.0, law.length, law.length)
     if law.has_growth:
         rates = (law.rest_growth, law.slip_growth, law.rest_speed)
         growth = (*rates, law.length, law.ratio * law.length)
