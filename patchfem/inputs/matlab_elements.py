@@ -98,6 +98,7 @@ def _check_variable(data: bytes, order: str, outer: Element) -> None:
 
 def _list_variables(data: bytes) -> Iterator[Element]:
     """Iterate over the variables of a file with a content, or over nothing for another version."""
+    # The header has 128 bytes
     order = VERSION_5_MARKS.get(data[124:128])
     return _list_elements(data, order, 128 if order else len(data), len(data), unit=1)
 

@@ -42,10 +42,6 @@ from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 N_END_LINES = 7
 # Side in samples of the square by which worn places of scans are enlarged, so that flanks count
 WORN_MARGIN_SIDE = 7
-# Mean height of a bow relative to the short waves, from which on it may be a scar. Instruments have lower ones.
-MIN_BOW_TO_WAVES_RATIO = 1.0
-# Area of a bow relative to the worn area, from which on the verdict depends on whether the bow is a scar
-MIN_BOW_TO_WORN_RATIO = 0.5
 MIN_REPORTED_LENGTH_ERROR = 5e-4  # smallest error of length that is reported
 
 
@@ -465,9 +461,8 @@ def _doubt(
     is_worn = code.startswith("worn")
     bow = 2 / 3 * max(bend, 0.0) * depths.size
     waves_height = robust_deviation(remove_long_waves(depths.after))
-    is_bow_large = (
-        bow > MIN_BOW_TO_WORN_RATIO * area and bend > MIN_BOW_TO_WAVES_RATIO * waves_height
-    )
+    # Whether a bow is a scar matters from half of the worn area on. Bows of instruments are lower than the short waves.
+    is_bow_large = bow > 0.5 * area and bend > waves_height
     has_poor_datum = is_cut or depths.errors.drift > _measure_short_noise(depths)
     if is_bow_large and (code in ("no_wear", "scar_or_drift") or (is_worn and has_poor_datum)):
         return "scar_or_bow", {"scar_depth": (bow + area) / depths.size}

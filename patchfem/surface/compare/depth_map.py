@@ -10,8 +10,6 @@ import numpy as np
 from .statistics import remove_long_waves, subtract_local_level
 
 UNWORN_LIMIT_DEVIATIONS = 2.5  # standard deviations within which a depth counts as unworn
-# Variance of an even distribution over an interval of length 1
-EVEN_VARIANCE = 1 / 12
 # Errors relative to those that the tiles show, which are few.
 FEW_TILES_ERROR_FACTOR = 1.3
 
@@ -105,7 +103,8 @@ class DepthMap:
             np.diff(self.depth, axis=k, append=np.take(self.depth, [-1], k))
             for k in range(self.depth.ndim)
         ]
-        return EVEN_VARIANCE * sum(step**2 for step in steps)
+        # Variance of an even distribution
+        return 1 / 12 * sum(step**2 for step in steps)
 
     def integrate(self, part, sign: float = 1.0) -> tuple[float, float]:
         """Integrate the depth over a mask, and return area [m2] or volume [m3] and its standard deviation.

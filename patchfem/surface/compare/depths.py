@@ -27,7 +27,6 @@ N_DATUM_ERROR_TILES = {1: 40, 2: 8}
 MIN_INDEPENDENT_TILES = 3.0
 # Distance from the largest mean, in its standard deviations, within which other means are counted as equally deep
 NEAR_DEVIATIONS = 2.0
-MEDIAN_SIDE = {1: 5, 2: 3}  # side of the window whose median leaves outliers out, by number of axes
 
 
 def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
@@ -283,8 +282,8 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     sides = WINDOW_SIDES[n_axes]
     single = _find_extreme(depth, depths.noise, 1, correlation)
 
-    # Medians leave single outliers out, and scatter a little more than means.
-    medians = ndimage.median_filter(depth, MEDIAN_SIDE[n_axes])
+    # Medians over 5 samples, or 3 x 3, leave single outliers out, and scatter a little more than means.
+    medians = ndimage.median_filter(depth, {1: 5, 2: 3}[n_axes])
     # Variance of the median of normal errors relative to that of their mean, pi/2
     noise = np.sqrt(1.57) * depths.noise
     wide = [_find_extreme(medians, noise, side, correlation) for side in sides[1:]]

@@ -34,10 +34,6 @@ from .units import HEADER_EXAMPLE, MISSING_SIZE_REMEDY, parse_length_unit
 
 # Largest relative range of the steps of coordinates; the steps of heights vary more.
 COORDINATE_STEP_TOL = 1e-6
-# Pattern of a number in quotes with a decimal comma
-_QUOTED_NUMBER_PATTERN = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
-# Pattern of a control character, which no text contains
-_CONTROL_CHARACTER_PATTERN = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 
 
 def read_text(content: Content, *, has_units: bool = False) -> Table:
@@ -77,12 +73,15 @@ def _decode(content: Content) -> str:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
-    if _CONTROL_CHARACTER_PATTERN.search(text):
+    # No text contains control characters
+    if re.search(r"[\x00-\x08\x0e-\x1f\x7f]", text):
         raise PatchfemError(
             f"{content.path}: not a text file; export the profile as text with two columns and {HEADER_EXAMPLE}"
         )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    return _QUOTED_NUMBER_PATTERN.sub(r"\1.\2", text).replace('"', "")
+    # Numbers in quotes with a decimal comma
+    text = re.sub(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"', r"\1.\2", text)
+    return text.replace('"', "")
 
 
 def _find_coordinates(
