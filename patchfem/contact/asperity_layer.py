@@ -131,8 +131,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
     """
     contact = problem.contact
     asperities = problem.asperities
-    # Thin layers on rough gaps need up to 40 Newton steps
-    for _ in range(60):
+    for _ in range(60):  # thin layers on rough gaps need up to 40 Newton steps
         # Forces of the law at the separations, and what they leave of the two equations
         log_pressure, decay = asperities.log_pressure(separation)
         log_force = log_pressure + np.log(problem.area)
@@ -161,9 +160,8 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         noise = 1e-12 + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
         relative_imbalance = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
         if max(relative_imbalance, np.max(fraction * np.abs(log_change))) <= noise:
-            # The force of a nearly unloaded node is computed from the pressure law of the asperity
-            # layer, because the Newton step gives that force only to rounding errors of the largest
-            # force.
+            # The force of a nearly unloaded node is computed from the pressure law of the asperity layer, because the Newton
+            # step gives that force only to rounding errors of the largest force.
             law_force = np.exp(np.minimum(log_force + log_change, MAX_LOG_FORCE))
             new_force = np.maximum(force + force_change, 0.0)
             new_force = np.where(fraction < 1e-15, law_force, new_force)
@@ -174,8 +172,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         along_log = -np.log1p(np.maximum(log_change, 0.0)) / decay
         limited_change = np.where(log_change > 0, along_log, change)
         load = contact.target[0] if imbalance.size else force.sum()
-        # Largest pressure that an unloaded node may reach in one step, relative to the mean
-        # pressure
+        # Largest pressure that an unloaded node may reach in one step, relative to the mean pressure
         risen = asperities.separation(np.array(0.01 * load / problem.area.sum()))
         separation = separation + np.maximum(change, np.minimum(limited_change, risen - separation))
     raise NotConverged(
