@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,13 @@ class WearProblem:
     cycles: float
 
 
+class LastJump(NamedTuple):
+    """Slip path (m,) [m] per cycle in the last jump, and its change (m,) [m] per cycle over this jump."""
+
+    path: np.ndarray
+    trend: np.ndarray
+
+
 @array_dataclass
 class WearState:
     """State of a wear computation after a number of cycles.
@@ -41,22 +49,20 @@ class WearState:
     - cycle: number of cycles since the start
     - depth, force: worn depth (m,) [m] and contact forces (m,) [N]
     - path: slip path (m,) [m] of the next cycle
-    - trend: change (m,) [m] of the slip path per cycle over the last jump
     - length: length of the next automatic jump in cycles
     - coarse_depth: worn depth (m,) [m] of the same jumps without halving
     - path_error: sum over the jumps [m] of the error that the change of the slip path within a jump causes
-    - jump_path: slip path (m,) [m] per cycle of the last jump
+    - jump: slip path of the last jump
     """
 
     cycle: float
     depth: np.ndarray
     force: np.ndarray
     path: np.ndarray
-    trend: np.ndarray
     length: float
     coarse_depth: np.ndarray
     path_error: float
-    jump_path: np.ndarray
+    jump: LastJump
 
     @property
     def error(self) -> float:
@@ -88,11 +94,10 @@ def make_initial_wear_state(problem: WearProblem, depth=None) -> WearState:
         depth=depth,
         force=problem.press(depth, zero),
         path=problem.path(depth),
-        trend=zero,
         length=1e-3 * problem.cycles,  # of the first automatic jump
         coarse_depth=depth,
         path_error=0.0,
-        jump_path=zero,
+        jump=LastJump(zero, zero),
     )
 
 
@@ -137,7 +142,7 @@ def take_jump(
 
     # A jump whose error exceeds the tolerance is shortened and repeated
     while True:
-        path = np.maximum(state.path + 0.5 * length * state.trend, 0.0)
+        path = np.maximum(state.path + 0.5 * length * state.jump.trend, 0.0)
         after, error = _take_halves(problem, state, path, length, tolerance)
         # Smallest length of a jump as a fraction of all cycles
         is_forced = count or length <= 1e-9 * problem.cycles
@@ -199,7 +204,7 @@ def _correct_path(
     corrected = replace(
         repeated,
         path=path,
-        trend=(path - state.path) / length,
+        jump=repeated.jump._replace(trend=(path - state.path) / length),
         path_error=state.path_error + path_error,
     )
     return corrected, max(error, path_error / max(tolerance * scale, MIN_WORN_DEPTH))
@@ -236,7 +241,7 @@ def _take_halves(
         depth=depth,
         force=force,
         coarse_depth=coarse_depth,
-        jump_path=path,
+        jump=state.jump._replace(path=path),
     )
 
     # Richardson's estimate of the error of the halves, relative to the tolerance
