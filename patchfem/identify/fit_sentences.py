@@ -39,8 +39,7 @@ def describe_fit(fit: Fit, names: Sequence[str], bounds: Sequence[tuple[str, str
     intervals = fit.intervals
     sentences += [_describe_direction(row, names) for row in intervals.unknown]
     in_combination = intervals.unknown.any(axis=0)
-    # Smallest sensitivity of a parameter with an effect on the residual, relative to the largest
-    # sensitivity.
+    # Smallest sensitivity of a parameter with an effect on the residual, relative to the largest sensitivity.
     min_sensitivity = 1e-9 * max(np.max(intervals.sensitivity), fit.rms)
 
     # An interval that ends at a bound, no effect on the data, or an interval over the whole range.

@@ -91,8 +91,7 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
     x = scan.x - middle[0]
     y = scan.y - middle[1]
     covered = _covered_length(x, length) * _covered_length(y, width) / (length * width)
-    # Smallest share of the face that a scan covers; a smaller one says little about the other
-    # heights.
+    # Smallest share of the face that a scan covers; a smaller one says little about the other heights.
     if covered < 0.5:
         size = f"{format_length(np.ptp(x))} x {format_length(np.ptp(y))}"
         face = f"{format_length(length)} x {format_length(width)}"
@@ -116,8 +115,7 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
     notes = list(part.notes)
     if spikes.any():
         notes.append(f"{scan.source}: {int(spikes.sum())} heights of spikes were removed")
-    # Share of a face below which missing heights at its sides are not reported; a row of a usual
-    # scan is more.
+    # Share of a face below which missing heights at its sides are not reported; a row of a usual scan is more.
     if 1 - covered > 1e-3:
         notes.append(
             f"{scan.source}: the scan does not cover {100 * (1 - covered):.2g} % of the face, at its sides; the nearest "

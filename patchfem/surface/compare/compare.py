@@ -471,8 +471,7 @@ def _doubt(
     if is_worn and not is_cut:
         # Width of a track relative to the common part, beyond which it may be growth at its ends.
         is_wide = tracks[0].values["width"].value > 0.8 * depths.size
-        # Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops
-        # are worn, it is smaller.
+        # Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops are worn, it is smaller.
         if is_wide and not _is_broken(depths, spans[0], 0.9):
             height = tracks[0].values["depth_mean"].value
             return "growth_at_ends", {"scar_depth": area / depths.size, "growth_height": height}

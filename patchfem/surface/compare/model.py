@@ -265,8 +265,7 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     subsets = np.array(list(combinations(range(len(tiles)), base.shape[1])))
     # At most 3000 datums are compared
     subsets = subsets[random.permutation(len(subsets))[:3000]]
-    # Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not
-    # determine a datum.
+    # Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not determine a datum.
     subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > 1e-3]
     datums = np.linalg.solve(centers[subsets], -modes[subsets][..., None])[..., 0]
 
@@ -294,8 +293,7 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     # smallest one. Datums of larger scale are not compared.
     near = np.flatnonzero(scales <= 4.0 * scales.min())
     relative = (few + datums[near] @ few_base.T) / max(scales.min(), 1e-15)
-    # Distance of a height from a datum, relative to the smallest scale, within which it agrees with
-    # the datum
+    # Distance of a height from a datum, relative to the smallest scale, within which it agrees with the datum
     agrees = np.abs(relative) < 5.0
     has_end = np.zeros(near.size, bool)
     for end in ends:
