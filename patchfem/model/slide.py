@@ -14,8 +14,6 @@ from ..core import Missing, array_dataclass
 from ..scene.rules.methods import find_climbed_grooves
 from .source import cache_by_file, name_key
 
-# Number of steps per leg at rest; the growth of bonds at rest, eq. (2.10), is exact for any step.
-STEPS_PER_HOLD = 4
 # Number of steps per cycle that gives an error of about REFERENCE_ERROR
 REFERENCE_STEPS_PER_CYCLE = 400
 # Relative error with REFERENCE_STEPS_PER_CYCLE; it falls with the square of the time step.
@@ -233,8 +231,8 @@ def read_path_file(path: Path) -> tuple[np.ndarray, np.ndarray]:
 def _sample_legs(time, rel_disp, steps: int) -> SlideSamples:
     """Sample the straight segments (legs) between corners at given times [s] and displacements [m].
 
-    Half of the steps are spread by length, half evenly over the legs that move. A leg at rest gets
-    `STEPS_PER_HOLD` steps.
+    Half of the steps are spread by length, half evenly over the legs that move. A leg at rest gets four steps, because the
+    growth of bonds at rest, eq. (2.10), is exact for any step.
 
     `time` and `rel_disp` (k,) are those of the corners, and `steps` is the number of steps in all.
     """
@@ -242,7 +240,7 @@ def _sample_legs(time, rel_disp, steps: int) -> SlideSamples:
     fraction = length / length.sum() / 2 + 1 / (2 * np.count_nonzero(length))
     # A number of steps that is exactly an integer has a relative round-off below 1e-12.
     moving_steps = np.maximum(1, np.ceil(steps * fraction * (1 - 1e-12)))
-    leg_steps = np.where(length > 0, moving_steps, STEPS_PER_HOLD).astype(int)
+    leg_steps = np.where(length > 0, moving_steps, 4).astype(int)
     corner_index = np.concatenate([[0], np.cumsum(leg_steps)])
     index = np.arange(corner_index[-1] + 1)
     return SlideSamples(

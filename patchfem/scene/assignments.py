@@ -33,9 +33,6 @@ POSITIVE_KEYS = {
 }
 # Largest number of cases of a sweep; the hashes and columns of more cases take gigabytes.
 MAX_CASES = 3_000_000
-# Number of significant digits of a value, so that a tenth of a range is
-# 0.1 and not 0.1000000000000001.
-SIGNIFICANT_DIGITS = 15
 # Pattern of a number
 _NUMBER_PATTERN = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 # Pattern of a range: first..last, with :count and the spacing log or lin
@@ -506,5 +503,5 @@ def _format_with_unit(value: float, unit: str) -> str:
 
 
 def _round_digits(value: float) -> float:
-    """Return the number `value` rounded to SIGNIFICANT_DIGITS."""
-    return float(f"{value:.{SIGNIFICANT_DIGITS}g}")
+    """Return the number `value` rounded to 15 digits, so that a tenth of a range is 0.1 and not 0.1000000000000001."""
+    return float(f"{value:.15g}")

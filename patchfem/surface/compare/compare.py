@@ -40,8 +40,6 @@ from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 
 # Number of lines of points at an end of a surface in which growth counts as growth at this end
 N_END_LINES = 7
-# Side in samples of the square by which worn places of scans are enlarged, so that flanks count
-WORN_MARGIN_SIDE = 7
 MIN_REPORTED_LENGTH_ERROR = 5e-4  # smallest error of length that is reported
 
 
@@ -397,8 +395,8 @@ def _is_broken(depths: DepthMap, span: tuple[int, int], fraction: float) -> bool
 
 
 def _enlarge(part) -> np.ndarray:
-    """Return a mask, `part`, enlarged on each side by half a square of WORN_MARGIN_SIDE samples."""
-    return ndimage.binary_dilation(part, np.ones((WORN_MARGIN_SIDE,) * part.ndim))
+    """Return a mask, `part`, enlarged on each side by half a square of 7 samples, so that flanks count."""
+    return ndimage.binary_dilation(part, np.ones((7,) * part.ndim))
 
 
 def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:

@@ -32,9 +32,6 @@ from .header import (
 from .table import Table
 from .units import HEADER_EXAMPLE, MISSING_SIZE_REMEDY, parse_length_unit
 
-# Largest relative range of the steps of coordinates; the steps of heights vary more.
-COORDINATE_STEP_TOL = 1e-6
-
 
 def read_text(content: Content, *, has_units: bool = False) -> Table:
     """Read the columns or the matrix in the content of a text file.
@@ -178,9 +175,10 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
 
 
 def _is_even(values: np.ndarray) -> bool:
-    """Return whether values (n,) increase by equal steps, within COORDINATE_STEP_TOL of the first step."""
+    """Return whether values (n,) increase by equal steps, within 1e-6 of the first step."""
     steps = np.diff(values)
-    return bool(steps[0] > 0 and np.ptp(steps) < COORDINATE_STEP_TOL * steps[0])
+    # The steps of heights vary more
+    return bool(steps[0] > 0 and np.ptp(steps) < 1e-6 * steps[0])
 
 
 def _read_rows(
