@@ -24,7 +24,7 @@ from patchfem.event_driven.laws import LAW_OF_NAME, make_law, masing, mirror_sta
 from patchfem.event_driven.laws.springs import make_cubic
 from patchfem.event_driven.periodic import copy_state
 from patchfem.event_driven.records import LawNumbers
-from patchfem.friction.bonds.parameters import BondGrowth, Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic

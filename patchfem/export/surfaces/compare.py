@@ -174,7 +174,7 @@ def _make_data(comparison: Comparison) -> Variables:
     curves = comparison.evidence.curves
     if curves is None:
         return _make_separate(comparison)
-    heights = (curves.before, curves.after)
+    heights = curves.heights
     if comparison.is_areal:
         data = make_maps(
             curves.x, curves.y, before_map=heights[0], after_map=heights[1], depth_map=curves.depth

@@ -458,7 +458,7 @@ def _doubt(
     is_cut = bool(tracks) and any(tracks[0].cut)
     is_worn = code.startswith("worn")
     bow = 2 / 3 * max(bend, 0.0) * depths.size
-    waves_height = robust_deviation(remove_long_waves(depths.after))
+    waves_height = robust_deviation(remove_long_waves(depths.heights[1]))
     # Whether a bow is a scar matters from half of the worn area on. Bows of instruments are lower than the short waves.
     is_bow_large = bow > 0.5 * area and bend > waves_height
     has_poor_datum = is_cut or depths.errors.drift > _measure_short_noise(depths)
@@ -599,5 +599,5 @@ def _compare_waves(result: Comparison, direction: str) -> dict[str, Quantity]:
     places = depths.x if axis or depths.y is None else depths.y
     ends = [track.values[name].value for track in result.tracks for name in ("from", "to")]
     ends = np.searchsorted(depths.x, [end for end in ends if end is not None])
-    lines = [np.atleast_2d(np.moveaxis(z, axis, -1)) for z in (depths.before, depths.after)]
+    lines = [np.atleast_2d(np.moveaxis(z, axis, -1)) for z in depths.heights]
     return waves.compare_waves(lines, measure_step(places), depths.noise_level, ends)

@@ -67,9 +67,9 @@ class DepthMap:
     errors: DepthErrors
 
     @property
-    def after(self) -> np.ndarray:
-        """Heights [m] of the second surface about the line or plane of the first one."""
-        return self.before - self.depth
+    def heights(self) -> tuple[np.ndarray, np.ndarray]:
+        """Heights [m] of the first and of the second surface about the line or plane of the first one."""
+        return self.before, self.before - self.depth
 
     @property
     def noise_level(self) -> float:
@@ -128,7 +128,7 @@ class DepthMap:
         relative = np.clip(self.depth / self.noise, -limit, limit)
         beside = self.masks.inside & ~covered & ~self.masks.missing
         loss_beside = max(float((relative * self.noise)[beside].sum()) * self.cell, 0.0)
-        height = remove_long_waves(self.before + self.after)
+        height = remove_long_waves(sum(self.heights))
         valleys = relative[self.masks.unworn & (height < np.median(height))]
         lowered = max(-float(np.median(valleys)), 0.0) if valleys.size else 0.0
         return loss_beside + lowered * self.noise_level * self.size

@@ -258,12 +258,10 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     """
     random = np.random.default_rng(0)
 
-    # Candidates: the datums through the most frequent depths (modes) of k tiles, of every subset of tiles up to
-    # MAX_COMPARED_DATUMS
+    # Candidates: the datums through the most frequent depths (modes) of k tiles, of at most 3000 subsets of tiles
     modes = np.array([find_mode(depth[tile]) for tile in tiles])
     centers = np.array([base[tile].mean(axis=0) for tile in tiles])
     subsets = np.array(list(combinations(range(len(tiles)), base.shape[1])))
-    # At most 3000 datums are compared
     subsets = subsets[random.permutation(len(subsets))[:3000]]
     # Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not determine a datum.
     subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > 1e-3]

@@ -178,7 +178,7 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     height = min(25.0, np.quantile(inner, 0.9) / 2)
     # Standard deviations of a single height on a flank.
     deep = np.flatnonzero(inner > max(height, 4.0))
-    # Number of samples of a flank that stays below FITTED_FLANK_DEVIATIONS
+    # Number of samples of a flank that stays below this depth
     length = int(deep[0]) + 3 if deep.size else 60
     stop = min(worn + length, x.size)
     low = max(worn - max(length, MIN_FLANK_SAMPLES), 0)

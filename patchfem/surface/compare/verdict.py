@@ -34,7 +34,7 @@ def measure_sharp_loss(depths: DepthMap) -> tuple[float, float]:
         return 0.0, 0.0
     relative = subtract_local_level(depths.depth, depths.masks.unworn) / depths.noise
     relative = np.where(np.isnan(relative) | depths.masks.missing, 0.0, relative)
-    height = (depths.before + depths.after) / 2 / depths.noise_level
+    height = sum(depths.heights) / 2 / depths.noise_level
     tops = find_worn_tops(relative, height, HALF_WIDTH_95 * depths.errors.gain)
     value = float((relative * depths.noise)[tops].sum()) * depths.cell
     noise = np.sqrt(depths.errors.correlation * (depths.noise[tops] ** 2).sum()) * depths.cell

@@ -183,12 +183,12 @@ def measure_roughness(
     edge = int(np.ceil(cutoff / 2 / step))
     for region, runs in parts.items():
         sizes = {}
-        for side in ("before", "after"):
+        for side, z in zip(("before", "after"), depths.heights):
             sections = []
             for first, last in runs:
-                z = getattr(depths, side)[first + edge : last + 1 - edge]
+                part = z[first + edge : last + 1 - edge]
                 # The bottom of a track is bent
-                sections += _cut_sections(z, cutoff / step, {"inside": 4, "outside": 1}[region])
+                sections += _cut_sections(part, cutoff / step, {"inside": 4, "outside": 1}[region])
             sizes[side] = _measure_sections(sections, step)
         table = {"before": {}, "after": {}, "ratio": {}}
         # Power of the mean over sections that gives a size of the roughness
