@@ -14,10 +14,6 @@ from ..core import Missing, array_dataclass
 from ..scene.rules.methods import find_climbed_grooves
 from .source import cache_by_file, name_key
 
-# Number of steps per cycle that gives an error of about REFERENCE_ERROR
-REFERENCE_STEPS_PER_CYCLE = 400
-# Relative error with REFERENCE_STEPS_PER_CYCLE; it falls with the square of the time step.
-REFERENCE_ERROR = 1e-3
 MAX_BENCH_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
 MAX_PATH_SAMPLES = 20_000_000  # largest number of samples in a path; more take too much memory
 MAX_SLIDE_SAMPLES = 5_000_000  # largest number of samples in a slide; more take too much memory
@@ -156,7 +152,8 @@ class SlidePath:
         min_steps = 0 if legs is None else 8 * (legs[0].size - 1)
         if pinned_steps is not None:
             return 4 * ceil(max(pinned_steps, min_steps) / 4)
-        per_cycle = REFERENCE_STEPS_PER_CYCLE * sqrt(REFERENCE_ERROR / tolerance)
+        # 400 steps give an error of about 1e-3, which falls with the square of the time step
+        per_cycle = 400 * sqrt(1e-3 / tolerance)
         cycles = 1.0
         if legs is not None:
             path = float(np.abs(np.diff(legs[1])).sum())

@@ -14,8 +14,6 @@ from .rules.scene_draft import SceneError
 
 # Largest size of a scene file in bytes; larger data belong in files that the scene names.
 MAX_SCENE_FILE_BYTES = 4 * 2**20
-# Pattern of a number with a decimal comma
-_DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?\d+,\d+")
 # Pattern of a quantity or a word without quotes
 _QUANTITY_OR_WORD_PATTERN = re.compile(
     r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
@@ -106,7 +104,7 @@ def _advise_spelling(text: str, line: int) -> str:
     if point and (point[2] or point[3]):
         number = f"{point[1]}{point[2] or 0}.{point[3] or 0}{point[4]}"
         return f"; put a digit on both sides of the point: {key} = {number}"
-    if _DECIMAL_COMMA_PATTERN.fullmatch(value):
+    if re.fullmatch(r"[-+]?\d+,\d+", value):
         return f"; write the decimal comma as a point: {key} = {value.replace(',', '.')}"
     if _QUANTITY_OR_WORD_PATTERN.fullmatch(value) and len(value) < 60:
         return f'; put a quantity or a word in quotes: {key} = "{value}"'

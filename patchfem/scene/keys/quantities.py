@@ -25,7 +25,6 @@ NUMBER_PATTERN = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY_PATTERN = re.compile(rf"({NUMBER_PATTERN})[ \t]+(\S.*)")
 PERCENTAGE_PATTERN = rf"\s*({NUMBER_PATTERN})[ \t]*%\s*"
 _JOINED_UNIT_PATTERN = re.compile(rf"({NUMBER_PATTERN})([^\s0-9.,#+±-].*)")
-_DECIMAL_COMMA_PATTERN = re.compile(r"[+-]?[0-9]+,[0-9]+")
 # Largest length of a quantity; a longer string is refused without being parsed.
 _MAX_CHARACTERS = 100
 _MAX_SHOWN_CHARACTERS = 60  # largest length of a wrong quantity in a message
@@ -164,7 +163,7 @@ def _describe_malformed_text(words: str, kind: str) -> str:
         reason = f"'{displayed_text}' is a bare number without a unit"
     elif any(sign in words for sign in ("±", "+/-", "+-")):
         reason = f"'{displayed_text}' has a tolerance: give only the nominal value"
-    elif _DECIMAL_COMMA_PATTERN.match(words):
+    elif re.match(r"[+-]?[0-9]+,[0-9]+", words):
         reason = f"'{displayed_text}' has a comma: use a point as the decimal separator"
     elif "#" in words:
         reason = f"'{displayed_text}': '#' is ambiguous, write the name of the unit ({_list_units(kind)})"
