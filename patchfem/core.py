@@ -52,10 +52,6 @@ __all__ = [
 
 G_N = 9.80665  # standard gravity [m s-2]
 MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness of a friction law refers
-# lower limit of the overlap of two mode shapes, which keeps its logarithm finite
-_ZERO_OVERLAP = 1e-30
-# assignment cost of a forbidden pair of modes, larger than that of any allowed assignment
-_FORBIDDEN_PAIR_COST = 1e6
 
 
 @dataclass_transform(eq_default=False, frozen_default=True)
@@ -288,9 +284,8 @@ def _assign_modes(lower, values, overlap) -> np.ndarray:
         return np.zeros(1, int)
     from scipy.optimize import linear_sum_assignment
 
-    cost = np.where(
-        values >= lower[:, None], -np.log(np.maximum(overlap, _ZERO_OVERLAP)), _FORBIDDEN_PAIR_COST
-    )
+    # 1e-30 keeps the logarithm finite, and the cost of a forbidden pair is larger than that of any allowed assignment
+    cost = np.where(values >= lower[:, None], -np.log(np.maximum(overlap, 1e-30)), 1e6)
     return linear_sum_assignment(cost)[1]
 
 

@@ -11,8 +11,6 @@ from math import isfinite, log10
 
 DisplayUnit = tuple[str, float]  # name of a unit, and number of these in one SI unit
 MAX_SIGNIFICANT_DIGITS = 7  # largest number of significant digits of a value
-MIN_PLAIN_POWER = -4  # smallest power of ten of a number without an exponent
-FIRST_EXPONENT_POWER = 7  # smallest power of ten of a large number with an exponent
 ZERO_ERROR_POWER = -400  # power of ten of a vanishing error, smaller than that of any float
 
 UNIT_LADDERS = {  # display units (name, number of these in one SI unit) for each SI unit, in ascending order
@@ -40,10 +38,6 @@ _UNIT_PATTERN = "|".join(sorted(SENTENCE_UNITS, key=len, reverse=True))
 _POWER_PATTERN = re.compile(
     rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNIT_PATTERN})(?![\w/^]))?"
 )
-
-
-# Pattern of a length below a metre without an exponent
-_SHORT_LENGTH_PATTERN = re.compile(r"(?<![\w./\"'-])(-?0\.\d+) m(?![\w/^])")
 
 
 def choose_unit(ladder: tuple[DisplayUnit, ...], size: float) -> DisplayUnit:
@@ -260,12 +254,17 @@ def rewrite_powers_of_ten(text: str) -> str:
         return format_quantity(float(number), SENTENCE_UNITS[unit], digits)
 
     text = _POWER_PATTERN.sub(rewrite, text)
-    return _SHORT_LENGTH_PATTERN.sub(lambda match: format_length(float(match[1]), 9), text)
+    # Lengths below a metre without an exponent
+    return re.sub(
+        r"(?<![\w./\"'-])(-?0\.\d+) m(?![\w/^])",
+        lambda match: format_length(float(match[1]), 9),
+        text,
+    )
 
 
 def _is_written_without_exponent(power: int) -> bool:
     """Return whether a number with this power of ten is written without an exponent."""
-    return MIN_PLAIN_POWER <= power < FIRST_EXPONENT_POWER
+    return -4 <= power < 7
 
 
 def _find_second_digit_power(error: float) -> int:

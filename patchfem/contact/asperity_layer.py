@@ -19,15 +19,8 @@ from .asperity_laws import SmoothAsperities
 from .bounded import BoundedProblem
 from .unilateral import compute_balances, describe_residuals, solve
 
-# Largest number of Newton steps; thin layers on rough gaps need up to 40
-MAX_LAYER_NEWTON_STEPS = 60
-LAYER_DIVERGED_MESSAGE = (
-    "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
-    'deviation, or set law = "linear"'
-)
 # Largest relative residual of a solution; rounding errors of steep laws stay below it
 SMOOTH_LAW_RESIDUAL_TOL = 1e-9
-RESIDUAL_REMEDY = "; make the rough layer softer (raise the decay length or the height deviation), or leave the layer out"
 # Largest logarithm of a pressure [Pa] at which the asperity layer counts as untouched
 MAX_UNTOUCHED_LOG_PRESSURE = -300.0
 # Largest logarithm of a force [N] for which products with the exponential function do not overflow
@@ -134,11 +127,11 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
     Raises
     ------
     NotConverged
-        After `MAX_LAYER_NEWTON_STEPS` steps, or if a step cannot be computed.
+        After 60 steps, or if a step cannot be computed.
     """
     contact = problem.contact
     asperities = problem.asperities
-    for _ in range(MAX_LAYER_NEWTON_STEPS):
+    for _ in range(60):  # thin layers on rough gaps need up to 40 Newton steps
         # Forces of the law at the separations, and what they leave of the two equations
         log_pressure, decay = asperities.log_pressure(separation)
         log_force = log_pressure + np.log(problem.area)
@@ -167,9 +160,8 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         noise = 1e-12 + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
         relative_imbalance = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
         if max(relative_imbalance, np.max(fraction * np.abs(log_change))) <= noise:
-            # The force of a nearly unloaded node is computed from the pressure law of the asperity
-            # layer, because the Newton step gives that force only to rounding errors of the largest
-            # force.
+            # The force of a nearly unloaded node is computed from the pressure law of the asperity layer, because the Newton
+            # step gives that force only to rounding errors of the largest force.
             law_force = np.exp(np.minimum(log_force + log_change, MAX_LOG_FORCE))
             new_force = np.maximum(force + force_change, 0.0)
             new_force = np.where(fraction < 1e-15, law_force, new_force)
@@ -180,11 +172,13 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         along_log = -np.log1p(np.maximum(log_change, 0.0)) / decay
         limited_change = np.where(log_change > 0, along_log, change)
         load = contact.target[0] if imbalance.size else force.sum()
-        # Largest pressure that an unloaded node may reach in one step, relative to the mean
-        # pressure
+        # Largest pressure that an unloaded node may reach in one step, relative to the mean pressure
         risen = asperities.separation(np.array(0.01 * load / problem.area.sum()))
         separation = separation + np.maximum(change, np.minimum(limited_change, risen - separation))
-    raise NotConverged(LAYER_DIVERGED_MESSAGE)
+    raise NotConverged(
+        "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
+        'deviation, or set law = "linear"'
+    )
 
 
 def _solve_at_approach(problem: AsperityProblem) -> AsperitySolution:
@@ -314,7 +308,10 @@ def press_with_asperities(layer: AsperityProblem) -> AsperitySolution:
     if not all(value <= SMOOTH_LAW_RESIDUAL_TOL for value in residuals.values()):
         raise NotConverged(
             describe_residuals(
-                residuals, SMOOTH_LAW_RESIDUAL_TOL, "contact.asperities", RESIDUAL_REMEDY
+                residuals,
+                SMOOTH_LAW_RESIDUAL_TOL,
+                "contact.asperities",
+                "; make the rough layer softer (raise the decay length or the height deviation), or leave the layer out",
             )
         )
     return solution

@@ -17,8 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 MAX_RESTORATIONS = 40  # Largest number of Newton steps that restore the resultants
-# Rounding errors of the resultants, in units of the last digit of the tractions that the shift adds
-RESULTANT_ROUND_OFF = 16 * np.finfo(float).eps
 
 
 class BoundedProblem(NamedTuple):
@@ -365,7 +363,8 @@ class _Holder:
             added = shift @ rigid / self.self_compliance
             moved = start + added
             is_inside = (moved > lower) & (moved < upper)
-            round_off = RESULTANT_ROUND_OFF * np.abs(added[is_inside]).sum()
+            # Rounding errors of the resultants, in units of the last digit of the tractions that the shift adds
+            round_off = 16 * np.finfo(float).eps * np.abs(added[is_inside]).sum()
             if np.abs(error).max() <= max(tolerance, round_off):
                 out = np.clip(traction, self.lower, self.upper)
                 out.flat[movable] = np.clip(moved, lower, upper)

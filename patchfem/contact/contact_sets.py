@@ -15,9 +15,6 @@ from scipy.linalg import cho_factor, cho_solve
 from ..core import PatchfemError, frozen_array
 from .set_arrays import SetArrays, make_set_arrays
 
-# Largest memory [bytes] of the stored contact sets; when it is full, the oldest set is replaced
-MAX_STORED_SETS_BYTES = 64e6
-
 
 class ContactSets:
     """Preloaded contact from which a compiled search for contact sets starts.
@@ -65,10 +62,10 @@ class ContactSets:
         self.energy = float(response @ self.opening) / 2
         self.size = float(np.abs(self.opening).max() + np.abs(self.c @ force).max())
 
-    def make_arrays(self, max_bytes: float = MAX_STORED_SETS_BYTES) -> SetArrays:
+    def make_arrays(self, max_bytes: float = 64e6) -> SetArrays:
         """Return the arrays in which compiled code searches contact sets, starting from the preloaded one.
 
-        `max_bytes` is the largest memory for the stored contact sets [bytes].
+        `max_bytes` is the largest memory for the stored contact sets [bytes]; when it is full, the oldest one is replaced.
         """
         # One set takes 25 m + 80 bytes: unknowns, nodes, energy and names.
         # Largest number of stored contact sets; no problem needs more

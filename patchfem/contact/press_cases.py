@@ -9,7 +9,7 @@ case. On a set, the balance of load and moment is a system of two equations for 
     [F_1x F_xx + K] [q    ] = [M + F_x a],
 
 with the resultants F of the forces per unit of each column, the amplitudes a of the shapes, and the stiffness K of the
-holder. The method may cycle; a case that has no set after `MAX_ROUNDS` rounds is solved alone (`unilateral.solve`).
+holder. The method may cycle; a case that has no set after 40 rounds is solved alone (`unilateral.solve`).
 """
 
 from typing import NamedTuple
@@ -20,7 +20,6 @@ from .set_table import SetTable
 
 # Smallest load [N] or overlap [m] for which the products in the check of a solution do not underflow
 MIN_COMPUTABLE_LOAD = 1e-200
-MAX_ROUNDS = 40  # number of rounds after which a case counts as cycling; 3 to 20 are usual
 # Rounding error of an opening, relative to the sum of the magnitudes of its terms
 OPENING_ROUND_OFF = 1e-13
 # Largest relative residual of a solved case; that of a wrong set is 1e-9 or more
@@ -112,7 +111,8 @@ def press_on_table(table: SetTable, holders: Holders, amplitudes, start) -> Pres
     active = start.copy()
 
     todo = np.arange(n_cases)
-    for _ in range(MAX_ROUNDS):
+    # After 40 rounds a case counts as cycling; 3 to 20 are usual
+    for _ in range(40):
         _complete_sets(table, holders.take(todo), amplitudes, active, todo)
         found = table.find_slots(active[todo])
         is_regular = found >= 0

@@ -8,8 +8,6 @@ from ..core import NotConverged, PatchfemError
 from .bounded import BoundedProblem, solve_bounded
 from .cells import CellCompliance
 
-MAX_ITERATIONS = 4000  # Largest number of steps; a hard case takes about 200
-
 
 class FaceLoading(NamedTuple):
     """Load and prescribed motions of the holder of a face.
@@ -114,7 +112,8 @@ def press_cells(
         (loading.load or 0.0) / compliance.cell_area * lines[is_free],
         springs[is_free] / compliance.cell_area,
     )
-    solution = solve_bounded(compliance, problem, start, tolerance, MAX_ITERATIONS)
+    # A hard case takes about 200 steps
+    solution = solve_bounded(compliance, problem, start, tolerance, max_iterations=4000)
     if not solution.residual <= tolerance:
         raise NotConverged(
             f"contact: the pressure did not converge; after {solution.n_iterations} steps the gap "

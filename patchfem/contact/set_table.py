@@ -19,8 +19,6 @@ import numpy as np
 
 from ..elasticity.lapack import dpotrf, dpotrs
 
-# Smallest number of nodes of a set whose stiffness depends on where its ends lie in their cells
-MIN_NODES_FOR_END_STIFFNESS = 3
 N_FIRST_SLOTS = 8  # number of sets for which a table has memory at first; it is doubled when needed
 
 
@@ -74,7 +72,7 @@ def solve_set(compliance, active, columns, *, with_ends: bool = True) -> SetSolu
 
     A node more at an end adds r S^-1 r to the stiffness of a column, with its opening r and the Schur complement S of its
     compliance; the loss of the last node takes f (B^-1) f, with its force f and the block B of the inverse compliance.
-    Neither counts for fewer than `MIN_NODES_FOR_END_STIFFNESS` nodes.
+    Neither counts for fewer than three nodes.
 
     Parameters
     ----------
@@ -136,7 +134,8 @@ def solve_set(compliance, active, columns, *, with_ends: bool = True) -> SetSolu
     set_force = set_force - dpotrs(factor, remainder[:, rows].T, lower=1)[0].T
     opening = set_force @ compliance[rows] - columns
     force[:, rows] = set_force
-    if nodes.size < MIN_NODES_FOR_END_STIFFNESS:
+    # The stiffness of larger sets depends on where their ends lie in their cells
+    if nodes.size < 3:
         return SetSolution(
             force, opening, np.zeros((n_ends, n_columns)), np.zeros((n_ends, n_columns))
         )

@@ -23,8 +23,6 @@ from . import bounded
 from .press_cases import MAX_RESIDUAL, OPENING_ROUND_OFF, Holders, press_on_table
 from .set_table import SetTable
 
-# Largest residual of the conjugate gradients, whose forces then show the contact set
-GRADIENT_RESIDUAL_TOL = 1e-11
 # Message about a compliance that is not positive definite
 INDEFINITE_COMPLIANCE_MESSAGE = (
     "contact: the compliance of the pieces is not positive definite to working precision; raise "
@@ -79,13 +77,11 @@ class _NodalCompliance:
 
 
 def solve_by_gradients(compliance: np.ndarray, problem) -> ContactSolution:
-    """Solve a contact problem by conjugate gradients, up to `GRADIENT_RESIDUAL_TOL`.
+    """Solve a contact problem by conjugate gradients, so that the forces show the contact set.
 
     `compliance` (n, n) [m/N] is that of the nodes, and `problem` a BoundedProblem.
     """
-    solution = bounded.solve_bounded(
-        _NodalCompliance(compliance), problem, tolerance=GRADIENT_RESIDUAL_TOL
-    )
+    solution = bounded.solve_bounded(_NodalCompliance(compliance), problem, tolerance=1e-11)
     return ContactSolution(solution.traction, solution.motion)
 
 

@@ -14,12 +14,9 @@ import numpy as np
 from ..core import NotConverged
 from .lapack import cho_inverse, dgemm, dpotrf, dtrsm, use_one_blas_thread
 
-DISPLACEMENT_COMPONENTS = np.arange(2)  # numbers of the displacements of a node, along x and inward
 # Smallest pivot, relative to the diagonal entry before its front is eliminated, for which round-off is not examined;
 # pivots lose digits where a long thin part bends
 MIN_SAFE_PIVOT = 1e-6
-# Largest residual of a solution, relative to the largest load, that is not refined
-MAX_UNREFINED_RESIDUAL = 1e-8
 # Largest relative change of the displacements by one step of refinement; factors with a larger
 # change are rejected
 MAX_REFINEMENT_CHANGE = 1e-2
@@ -110,7 +107,7 @@ class Fronts:
         -------
         float
             Largest change over the largest displacement; 0 if no pivot is small or the residual is at most
-            `MAX_UNREFINED_RESIDUAL`.
+            1e-8 of the largest load.
 
         Raises
         ------
@@ -125,7 +122,7 @@ class Fronts:
         load[self.interface] = number**2 * ((np.sqrt(5) - 1) / 2) % 1 - 0.5
         u = self.solve(load)
         residual = load - self.compute_forces(u)
-        if np.abs(residual).max() <= MAX_UNREFINED_RESIDUAL * np.abs(load).max():
+        if np.abs(residual).max() <= 1e-8 * np.abs(load).max():
             return 0.0
         change = float(np.abs(self.solve(residual)).max() / np.abs(u).max())
         if not change <= MAX_REFINEMENT_CHANGE:
@@ -294,9 +291,7 @@ def _add_stiffnesses(terms, order, position) -> np.ndarray:
 
 def _number_unknowns(nodes) -> np.ndarray:
     """Return the numbers (..., 2 k) of the unknowns of nodes (..., k), node by node along x and inward."""
-    return (2 * nodes[..., None] + DISPLACEMENT_COMPONENTS).reshape(
-        *nodes.shape[:-1], 2 * nodes.shape[-1]
-    )
+    return (2 * nodes[..., None] + np.arange(2)).reshape(*nodes.shape[:-1], 2 * nodes.shape[-1])
 
 
 def _eliminate(own_nodes, boundary, matrix) -> tuple[Front, np.ndarray]:

@@ -27,17 +27,9 @@ from .lapack import dpotrf, dtrsm
 
 ORDER = 4  # Order of the splines and polynomials
 DEPTH_RATIO = 0.25  # Ratio of the thicknesses of neighbouring bricks towards both faces
-# Smallest ratio of the depths of two edges of bricks near an interface of layers; closer edges would make thin bricks
-MIN_EDGE_DEPTH_RATIO = 2.0
 CACHE_FOLDER_NAME = "patchfem-sides"
 # Largest number of cached blocks; each needs up to 1 MB
 MAX_CACHED_BLOCKS = 100
-# Number of changes kept in memory, such as those of two pieces on three levels
-MAX_CHANGES_IN_MEMORY = 8
-# Displacements along an axis (0: x, 1: y, 2: inward) that guides hold on the sides across an axis, for normal loads and
-# for shear loads along x
-NORMAL_GUIDES = ((0, 0), (1, 1))
-SHEAR_GUIDES = ((1, 0), (2, 0), (1, 1))
 
 
 class LayerStack(NamedTuple):
@@ -151,11 +143,12 @@ def _grade_depths(stack: LayerStack, n_bricks: int) -> np.ndarray:
     depths = np.concatenate([below_face, above_far_face])
     for interface in interfaces:
         ratio = np.maximum(depths, interface) / np.minimum(depths, interface)
-        depths = depths[ratio >= MIN_EDGE_DEPTH_RATIO]
+        # Edges of bricks that are closer to an interface would make thin bricks
+        depths = depths[ratio >= 2.0]
     return np.concatenate([[0.0], np.sort(np.append(depths, interfaces)), [height]])
 
 
-@lru_cache(maxsize=MAX_CHANGES_IN_MEMORY)
+@lru_cache(maxsize=8)  # such as the changes of two pieces on three levels
 def compute_side_change(stack: LayerStack, shape: BlockShape, level: int = 1) -> SideChange:
     """Compute the change of compliance by free sides, or read it from the user's cache.
 
@@ -226,10 +219,11 @@ def _compute_changes(x: Axis, y: Axis, depths, stack: LayerStack):
         # One block with free sides serves normal loads and the shear loads of the other parity along x
         block = _Quarter((x, y), (parity_x, parity_y), depths, stack)
         free = block.condense(())
-        guided = block.condense(NORMAL_GUIDES)
+        # Displacements along an axis (0: x, 1: y, 2: inward) that guides hold on the sides across an axis
+        guided = block.condense(((0, 0), (1, 1)))
         inward = block.find_rows(2)
         normal[parity_x, parity_y] = (free - guided)[inward, inward]
-        guided = block.condense(SHEAR_GUIDES)
+        guided = block.condense(((1, 0), (2, 0), (1, 1)))
         along = block.find_rows(0)
         shear[1 - parity_x, parity_y] = (free - guided)[along, along]
     return normal, shear

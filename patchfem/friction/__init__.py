@@ -14,6 +14,7 @@ PUBLIC = {
         "choose_engine",
     ),
     "bonds.parameters": (
+        "BondGrowth",
         "Bonds",
         "growth_numbers",
     ),

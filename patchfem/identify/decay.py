@@ -6,9 +6,6 @@ from ..core import PatchfemError
 from .sinusoids import FittedModes, Limits, SinusoidFit, SinusoidProblem
 
 MIN_DECAY_SAMPLES = 32  # smallest number of samples of a record
-MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
-# Smallest reduction of the sum of squares by a further sinusoid that does not fit noise
-MIN_RELATIVE_SQUARES_DECREASE = 0.36
 # Smallest distance of two sinusoids in spectral lines (1/T for a record of length T).
 MIN_SPECTRAL_LINE_SPACING = 3
 DAMPING_ROUND_OFF = 1e-10  # error of a damping ratio of a record without noise
@@ -37,7 +34,8 @@ def fit_decay(time, value) -> FittedModes:
     time = time - time[0]
     problem = SinusoidProblem(time, value, [np.ones(time.size)])
     spacing = 2 * np.pi * MIN_SPECTRAL_LINE_SPACING / time[-1]
-    limits = Limits(MAX_SINUSOIDS, MIN_RELATIVE_SQUARES_DECREASE, spacing=spacing)
+    # A further sinusoid that reduces the sum of squares by less fits noise
+    limits = Limits(count=8, decrease=0.36, spacing=spacing)
     fit = problem.fit(lambda fit: _find_starts(time, fit), limits)
     if not fit.poles.size:
         raise PatchfemError("the record contains no decaying oscillation")

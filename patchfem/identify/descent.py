@@ -15,10 +15,7 @@ from scipy.optimize import lsq_linear
 from ..core import Missing, PatchfemError
 
 FINITE_DIFFERENCE_STEP = 1e-5  # step of finite differences, relative to the range of a parameter
-# Predicted relative decrease of the sum of squares by a step, below which a descent has converged; that by the round-off of
-# differences is smaller
-COST_TOL = 1e-10
-MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
+MAX_DESCENT_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
 # Ratio of the decrease of the sum of squares to the predicted one, below which the next steps are shorter
 MIN_DECREASE_RATIO = 0.25
 # Largest distance of a point from a known minimum that a descent has reached, relative to the ranges, and largest relative
@@ -285,13 +282,14 @@ def descend(model: UnitCubeResidual, u, known: Sequence[Descent] = ()) -> Descen
     u = np.array(u, float)
     if model(u) is None:
         return Descent(u, np.inf, False, model.rows)
-    # COST_TOL of an expensive residual, whose own errors are about as large
-    tolerance = 1e-5 if model.is_expensive else COST_TOL
+    # Predicted relative decrease of the sum of squares below which a descent has converged: about the errors of an expensive
+    # residual, and above the round-off of differences
+    tolerance = 1e-5 if model.is_expensive else 1e-10
     linear = LinearModel(model, u, range(u.size))
     # Largest change of a parameter in the first step, relative to its range
     trust = 0.3
     is_converged = False
-    for _ in range(MAX_EVALUATIONS):
+    for _ in range(MAX_DESCENT_EVALUATIONS):
         # the bounded linear problem predicts the sum of squares after the step
         factor = linear.compress()
         found = lsq_linear(factor[:, :-1], -factor[:, -1], linear.limit(trust), method="bvls")

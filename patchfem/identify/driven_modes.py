@@ -15,9 +15,6 @@ from .sinusoids import FittedModes, Limits, SinusoidFit, SinusoidProblem
 
 # order of the time derivative of the displacement, by the quantity of the response
 DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
-# Smallest relative reduction of the sum of squares by a further mode, and smallest rms of the mode relative to that
-# of the response.
-DRIVEN_MODE_LIMITS = Limits(count=12, decrease=0.02, rms=3e-3)
 # Number of samples at each end that are not fitted, because of the jump of the periodic continuation.
 N_EDGE_SAMPLES = 32
 # Largest number of fitted samples, from the beginning of the record.
@@ -137,7 +134,9 @@ def fit_driven_modes(
     record = _DrivenRecord(step, force[fitted], response[fitted], DERIVATIVE_ORDERS[quantity])
     problem = record.problem
 
-    fit = problem.fit(record.find_starts, DRIVEN_MODE_LIMITS)
+    # Smallest relative reduction of the sum of squares by a further mode, and smallest rms of the mode relative to that of
+    # the response
+    fit = problem.fit(record.find_starts, Limits(count=12, decrease=0.02, rms=3e-3))
     if not fit.poles.size:
         raise PatchfemError(
             "no mode is visible in the response; a record over a resonance is needed"

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core import Outcome
-from .descent import MAX_EVALUATIONS
+from .descent import MAX_DESCENT_EVALUATIONS
 from .least_squares import Fit
 
 
@@ -39,8 +39,7 @@ def describe_fit(fit: Fit, names: Sequence[str], bounds: Sequence[tuple[str, str
     intervals = fit.intervals
     sentences += [_describe_direction(row, names) for row in intervals.unknown]
     in_combination = intervals.unknown.any(axis=0)
-    # Smallest sensitivity of a parameter with an effect on the residual, relative to the largest
-    # sensitivity.
+    # Smallest sensitivity of a parameter with an effect on the residual, relative to the largest sensitivity.
     min_sensitivity = 1e-9 * max(np.max(intervals.sensitivity), fit.rms)
 
     # An interval that ends at a bound, no effect on the data, or an interval over the whole range.
@@ -70,8 +69,8 @@ def describe_fit(fit: Fit, names: Sequence[str], bounds: Sequence[tuple[str, str
 
     if fit.outcome is Outcome.NOT_CONVERGED:
         sentences.append(
-            f"not converged: the best search did not settle within {MAX_EVALUATIONS} evaluations, and no search from "
-            "another start ended within 1 % of the best score"
+            f"not converged: the best search did not settle within {MAX_DESCENT_EVALUATIONS} evaluations, and no search "
+            "from another start ended within 1 % of the best score"
         )
     return sentences
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..measures.decay_curve import HalfCycles, smooth_slopes
-from .sinusoids import MAX_EVALUATIONS, START_TOL, SinusoidProblem
+from .sinusoids import MAX_SINUSOID_EVALUATIONS, START_TOL, SinusoidProblem
 
 MIN_HALF_CYCLE_SAMPLES = 5  # smallest number of samples in a half cycle
 # Smallest relative standard deviation of the midpoint (relative to the half period) and the size of a half cycle,
@@ -22,9 +22,6 @@ SINE_FIT_ERROR = 3e-5
 N_NEIGHBOUR_HALF_CYCLES = 8
 # Cycles at the beginning of a decay to which the first sinusoid is fitted
 N_CYCLES_OF_FIRST_SINE = 1.2
-# Lower and upper bounds of the frequency of the first cycle, relative to that of the highest spectral line, and of its
-# decay rate [1/s].
-FIRST_CYCLE_BOUNDS = ((0.75, -np.inf), (1.3, np.inf))
 PADDING_FACTOR = 8  # length of the zero-padded record relative to the record, for a finer spectrum
 
 
@@ -157,10 +154,11 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
             f"{2 * MIN_HALF_CYCLE_SAMPLES} are needed"
         )
     omega = 2 * np.pi * frequency
-    bounds = tuple(np.array([ratio * omega, rate]) for ratio, rate in FIRST_CYCLE_BOUNDS)
+    # Bounds of the frequency of the first cycle; its decay rate is free
+    bounds = (np.array([0.75 * omega, -np.inf]), np.array([1.3 * omega, np.inf]))
     record = (time[is_first] - time[0], value[is_first])
     problem = SinusoidProblem(*record, [np.ones(record[0].size)], bounds=bounds)
-    cycle = problem.refine([[omega, 0.0]], MAX_EVALUATIONS, START_TOL)
+    cycle = problem.refine([[omega, 0.0]], MAX_SINUSOID_EVALUATIONS, START_TOL)
     cosine, sine = cycle.coefficients[0]
 
     # A half cycle goes from peak to peak around a zero of the sinusoid, and must lie completely in the record.

@@ -16,9 +16,6 @@ from .intervals import FitIntervals, IntervalKind, compute_intervals
 
 # A descent has reached the best minimum if the ratio of its residual to the smallest one is at most this value.
 SAME_MINIMUM_RATIO = 1.01
-# Number of trial points for the choice of the starting points: per parameter, and per start of an expensive residual
-N_TRIALS_PER_VALUE = 8
-N_TRIALS_PER_START = 3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -183,9 +180,8 @@ class Problem:
         points = [point for point in given if np.isfinite(self._try_point(point))]
         trials = []
         if max_points > len(points):
-            count = N_TRIALS_PER_VALUE * n
-            if self.model.is_expensive:
-                count = N_TRIALS_PER_START * max_points
+            # Trial points per parameter, or per start of an expensive residual
+            count = 3 * max_points if self.model.is_expensive else 8 * n
             trials = make_space_filling_points(count, n)
             costs = np.array([self._try_point(point) for point in trials])
             order = np.argsort(costs, kind="stable")

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 START_TOL = 1e-3  # relative change at convergence from an initial guess
-MAX_EVALUATIONS = 100  # largest number of evaluations of a fit
+MAX_SINUSOID_EVALUATIONS = 100  # largest number of evaluations of a fit
 
 
 class Limits(NamedTuple):
@@ -210,7 +210,7 @@ class SinusoidProblem:
                 attempts.append(self.refine(poles, 12, START_TOL))
             start = min(attempts, key=lambda fit: fit.mean_square)
             # Relative change at convergence of a fit
-            further = self.refine(start.poles, MAX_EVALUATIONS, 1e-13)
+            further = self.refine(start.poles, MAX_SINUSOID_EVALUATIONS, 1e-13)
 
             # two close or overdamped sinusoids fit a decay that is not exponential
             omega, rate = further.poles.T

@@ -7,9 +7,6 @@ from ..exceptions import PatchfemError
 
 MAX_LISTED_NAMES = 12  # largest number of names that a message lists
 
-# Exceptions that are mistakes in the program; a damaged file leads to any other one in a library.
-PROGRAM_MISTAKES = (NameError, AttributeError, TypeError, AssertionError)
-
 
 def shorten(text, length: int = 40) -> str:
     """Make a text from a file or a library printable and at most `length` characters long."""
@@ -29,11 +26,12 @@ def list_some(texts: Sequence[str]) -> str:
 def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
     """Convert exceptions that are raised while a damaged file is read into a PatchfemError.
 
-    Its message is `message`, the reason in brackets and `remedy`. `PROGRAM_MISTAKES` pass.
+    Its message is `message`, the reason in brackets and `remedy`. Mistakes in the program pass; a damaged file leads to any
+    other exception in a library.
     """
     try:
         yield
-    except (PatchfemError, *PROGRAM_MISTAKES):
+    except (PatchfemError, NameError, AttributeError, TypeError, AssertionError):
         raise
     except Exception as error:
         # Largest number of characters of a quoted reason

@@ -25,8 +25,6 @@ from .tables import MAX_LINE_CHARACTERS, NUMBER_PATTERN, has_decimal_comma, pars
 from .units import CHANNEL_UNITS
 
 RECORD_EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
-# Channels that every motion of `patchfem export` has.
-MOTION_CHANNELS = {"absolute_acceleration", "base_acceleration"}
 MAX_TABLE_COLUMNS = 1000  # largest number of columns in a table or an array
 
 
@@ -79,7 +77,8 @@ def _read_universal(
     notes = []
     channels = universal.make_channels(path, universal.read_datasets(path), notes)
     names = [channel.name for channel in channels]
-    if MOTION_CHANNELS <= set(names):
+    # Every motion of `patchfem export` has these channels
+    if {"absolute_acceleration", "base_acceleration"} <= set(names):
         # The data types do not distinguish the displacements of an export; the names do.
         channels = [
             channel._replace(quantity=_find_quantity(channel.name, names, exported_names))

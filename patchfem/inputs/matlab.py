@@ -21,8 +21,6 @@ MAX_STRUCTURE_NESTING = 8  # largest depth of nested structures
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NUMBER_DTYPE_KINDS = "iufbc"  # kinds of NumPy types that contain numbers
 Arrays = dict[str, np.ndarray | sparse.csc_array]  # arrays of a file by name
-# MATLAB classes with numbers, besides integers. "" stands for data of other programs.
-MATLAB_NUMBER_CLASSES = ("", "double", "single", "logical")
 
 
 def read_variables(path, data: bytes | None = None) -> Arrays:
@@ -149,7 +147,10 @@ def _add_group(arrays: Arrays, group, prefix: str, depth: int) -> None:
         if "MATLAB_sparse" in item.attrs:
             arrays[prefix + name] = _read_sparse(item)
         elif isinstance(item, h5py.Dataset):
-            if item.shape is not None and (kind in MATLAB_NUMBER_CLASSES or "int" in kind):
+            # Classes with numbers, besides integers; "" stands for data of other programs
+            if item.shape is not None and (
+                kind in ("", "double", "single", "logical") or "int" in kind
+            ):
                 _add_dataset(arrays, prefix + name, item)
         elif kind == "struct" and depth < MAX_STRUCTURE_NESTING:
             _add_group(arrays, item, f"{prefix}{name}.", depth + 1)

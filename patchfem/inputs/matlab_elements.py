@@ -13,13 +13,10 @@ from .packed import MAX_UNPACKED_BYTES
 UNPACKED_PIECE_BYTES = 2**12  # bytes that are unpacked at once, to at most 1000 times as many
 # Version and order of the bytes in the header of a file.
 VERSION_5_MARKS = {b"\x00\x01IM": "little", b"\x01\x00MI": "big"}
-HEADER_BYTES = 128  # length [bytes] of the header of a file
 COMPRESSED_TYPE = 15  # type number of a compressed variable
 VARIABLE_TYPE = 14  # type number of a variable
 # Type numbers of integers, floats and characters.
 NUMBER_TYPES = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)
-# Classes of cells, structures, objects, functions and opaque objects, which contain variables
-NESTED_CLASSES = (1, 2, 3, 16, 17)
 SPARSE_CLASS = 5  # class of a sparse matrix
 COMPLEX_FLAG = 1 << 11  # bit of the flags of complex numbers
 
@@ -85,7 +82,8 @@ def _check_variable(data: bytes, order: str, outer: Element) -> None:
         # Numbers follow flags, dimensions and name. A sparse matrix has two arrays of places before them.
         count = 4 + 2 * (array_class == SPARSE_CLASS) + bool(flags & COMPLEX_FLAG)
         allowed = NUMBER_TYPES
-        if array_class in NESTED_CLASSES:
+        # Cells, structures, objects, functions and opaque objects contain variables
+        if array_class in (1, 2, 3, 16, 17):
             count = len(parts)
             allowed = (*NUMBER_TYPES, VARIABLE_TYPE)
         if len(parts) < count:
@@ -100,8 +98,9 @@ def _check_variable(data: bytes, order: str, outer: Element) -> None:
 
 def _list_variables(data: bytes) -> Iterator[Element]:
     """Iterate over the variables of a file with a content, or over nothing for another version."""
+    # The header has 128 bytes
     order = VERSION_5_MARKS.get(data[124:128])
-    return _list_elements(data, order, HEADER_BYTES if order else len(data), len(data), unit=1)
+    return _list_elements(data, order, 128 if order else len(data), len(data), unit=1)
 
 
 def _list_elements(

@@ -26,13 +26,6 @@ CHANNEL_UNITS = {
 }
 # The SI unit is the first one of each table that is not "".
 SI_UNITS = {name: next(filter(None, units)) for name, units in CHANNEL_UNITS.items()}
-# Spelling of a unit in the tables, by other spellings in lower case
-_UNIT_SYNONYMS = {
-    "sec": "s",
-    "seconds": "s",
-    "newton": "N",
-    "newtons": "N",
-}
 # Spellings of "per second squared" and of "per second" at the end of a unit.
 _RATE_PATTERNS = {
     "/s^2": re.compile(r" ?/ ?s(?:ec)?(?:\^|\*\*)?2$| s\^?-2$"),
@@ -43,7 +36,7 @@ _RATE_PATTERNS = {
 def normalize_unit(text: str) -> str:
     """Spell the text of a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
     text = quantities.normalize_unit(text)
-    text = _UNIT_SYNONYMS.get(text.lower(), text)
+    text = {"sec": "s", "seconds": "s", "newton": "N", "newtons": "N"}.get(text.lower(), text)
     for ending, pattern in _RATE_PATTERNS.items():
         text = pattern.sub(ending, text)
     return text

@@ -55,7 +55,6 @@ TUPLE_MODULES = (
     "motion_measures.py",
     "points/rows.py",
 )
-CACHE_FOLDER_PATTERN = re.compile(r"[0-9a-f]{16}")
 # Time [s] since the last start of a process with a folder of compiled code after which it is removed: 30 days. Every edit of
 # a kernel, every release and every kind of CPU makes a folder of 1 to 5 MB; several may share a home folder.
 MAX_UNUSED_SECONDS = 30 * 86400.0
@@ -63,8 +62,6 @@ MAX_UNUSED_SECONDS = 30 * 86400.0
 STORES_CODE = os.name == "posix" and os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 # Time to wait for another process that compiles [s]: ten times the longest compilation.
 MAX_LOCK_WAIT_SECONDS = 300.0
-# Time between two attempts to take the lock [s], short compared with a compilation.
-LOCK_CHECK_SECONDS = 0.05
 # Functions called by this process whose machine code cannot be stored, so that every
 # process imports numba for them.
 UNCACHED_FUNCTIONS = set()
@@ -215,7 +212,8 @@ def lock_exclusively(path: Path):
         # Ask again and again. A lock that waits by itself could not be given up.
         end = monotonic() + MAX_LOCK_WAIT_SECONDS
         while not lock_file(file) and monotonic() < end:
-            sleep(LOCK_CHECK_SECONDS)
+            # Short compared with a compilation
+            sleep(0.05)
         yield
     finally:
         os.close(file)
@@ -437,7 +435,7 @@ def remove_old_folders(folder: Path) -> None:
         is_new = not any(folder.iterdir())
         os.utime(folder)
         for entry in os.scandir(folder.parent) if is_new else ():
-            is_code = CACHE_FOLDER_PATTERN.fullmatch(entry.name)
+            is_code = re.fullmatch(r"[0-9a-f]{16}", entry.name)
             if not is_code or not entry.is_dir(follow_symlinks=False):
                 continue
             if time() - entry.stat().st_mtime > MAX_UNUSED_SECONDS:

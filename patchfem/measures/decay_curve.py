@@ -28,11 +28,6 @@ NOISE_HALF_WIDTH_IN_HALF_CYCLES = 8
 VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
 # Smallest half cycle that is not attributed to round-off, relative to the largest one.
 MIN_HALF_CYCLE_RATIO = 1e-9
-# Largest motion between two reversals, relative to the range in one period, that is attributed to a
-# faster mode.
-MAX_RIPPLE_RATIO = 0.25
-# Shortest last half cycle relative to the one before it; a shorter one ends at a ripple of a faster mode.
-MIN_HALF_DURATION = 0.75
 CURVE_END_TOL = 1e-6  # Relative distance by which a curve is extrapolated beyond its ends.
 
 
@@ -127,9 +122,9 @@ def locate_reversals(time, position, speed) -> ArrayPair:
 def measure_last_cycle_amplitude(time, position, speed, period: float) -> float | None:
     """Return half the peak-to-peak value [m] of the last whole cycle of a motion, which three turns bound.
 
-    Motions between reversals that are smaller than MAX_RIPPLE_RATIO times the range in the last period are attributed
+    Motions between reversals that are smaller than a quarter of the range in the last period are attributed
     to a faster mode and ignored. The last turn may be such a ripple on the way to the next one; it counts if the half
-    cycle before it has lasted at least MIN_HALF_DURATION times as long as the previous one.
+    cycle before it has lasted at least three quarters as long as the previous one.
 
     Parameters
     ----------
@@ -148,11 +143,12 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     if last_range <= MIN_HALF_CYCLE_RATIO * np.ptp(position):
         return last_range / 2
     times, places = locate_reversals(time, position, speed)
-    turns = _find_last_turns(places, MAX_RIPPLE_RATIO * last_range)
+    turns = _find_last_turns(places, 0.25 * last_range)
     if len(turns) < 3:
         return None
     durations = -np.diff(times[turns])
-    first = 0 if durations[0] >= MIN_HALF_DURATION * durations[1] else 1
+    # A shorter half cycle ends at a ripple of a faster mode
+    first = 0 if durations[0] >= 0.75 * durations[1] else 1
     if len(turns) < first + 3:
         return None
     return max_abs(np.diff(places[turns[first : first + 3]])) / 2

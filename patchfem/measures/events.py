@@ -23,11 +23,10 @@ REVERSAL_UP = 3
 REVERSAL_DOWN = 4
 SEGMENT_BORDER = 5
 EVENT_KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
-MAX_KEPT_EVENTS = 100_000  # largest number of events of a run that are kept, the last ones
 
 
 class Events(NamedTuple):
-    """Last events of a run in chronological order, at most MAX_KEPT_EVENTS.
+    """Last events of a run in chronological order, at most 100 000.
 
     - time (k,): time [s].
     - interface (k,): number of the interface, from 1; 0 for the border between two segments of the
@@ -43,12 +42,12 @@ class Events(NamedTuple):
 
 
 def sort_events(rows) -> Events:
-    """Return the last MAX_KEPT_EVENTS events in the order of time.
+    """Return the last 100 000 events in the order of time.
 
     Each of the rows has time [s], number of the interface, index of EVENT_KIND_NAMES and relative displacement [m].
     """
     rows = np.array(rows, float).reshape(-1, 4)
-    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))][-MAX_KEPT_EVENTS:]
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))][-100_000:]
     time, interface, kind, slide = rows.T.copy()
     return Events(time, interface.astype(np.int32), kind.astype(np.int8), slide)
 

@@ -21,11 +21,6 @@ Measures = dict[str, Measure]  # by name
 ArrayPair = tuple[np.ndarray, np.ndarray]  # two arrays of one shape
 
 MODAL_COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
-# Round-off error of the friction work, relative to the energy that is exchanged and stored in the
-# run.
-RELATIVE_WORK_ROUND_OFF = 1e-10
-# Largest ratio of neighbouring second differences at which a curve counts as smooth.
-MAX_SMOOTH_CURVATURE_RATIO = 4.0
 
 
 def compare_friction_works(sampled_work, balance_work, exchanged_work, energy=0.0):
@@ -38,7 +33,7 @@ def compare_friction_works(sampled_work, balance_work, exchanged_work, energy=0.
     exchanged_work : float or (n,) array
         Sum of the absolute values of the friction work of all steps [J].
     energy : float or (n,) array, optional
-        Energy that is exchanged and stored in the whole run [J]. The fraction `RELATIVE_WORK_ROUND_OFF` of
+        Energy that is exchanged and stored in the whole run [J]. The fraction 1e-10 of
         it is added to `exchanged_work`, so that the result for a stuck interface is not dominated
         by round-off.
 
@@ -50,7 +45,7 @@ def compare_friction_works(sampled_work, balance_work, exchanged_work, energy=0.
     difference = np.abs(sampled_work - balance_work)
     return ratio_or_zero(
         difference * (difference > MIN_ENERGY_DIFFERENCE),
-        exchanged_work + RELATIVE_WORK_ROUND_OFF * energy,
+        exchanged_work + 1e-10 * energy,
     )
 
 
@@ -216,7 +211,7 @@ def interpolate_peak(samples) -> tuple[float, float]:
 
     If the curve is smooth, its peak is the vertex of the parabola through the largest sample and its
     neighbours. It is smooth if neighbouring second differences around its largest sample differ by
-    at most a factor of MAX_SMOOTH_CURVATURE_RATIO; next to a jump, their signs differ. With a jump at the largest
+    at most a factor of four; next to a jump, their signs differ. With a jump at the largest
     sample, the error is the change over one step on the smooth side. With a kink between two samples, it is the
     distance of the largest sample from the crossing of the lines through the samples on both sides.
 
@@ -238,7 +233,7 @@ def interpolate_peak(samples) -> tuple[float, float]:
     left, centre, right = samples[middle - 1 : middle + 2].tolist()
     curvature = left - 2 * centre + right
     curvatures = np.diff(samples[max(middle - 2, 0) : middle + 3], 2)
-    if curvatures.max() * MAX_SMOOTH_CURVATURE_RATIO <= curvatures.min():
+    if 4.0 * curvatures.max() <= curvatures.min():
         # The slope at the middle sample vanishes within one step of it.
         if curvature < 0 and abs(right - left) <= -2 * curvature:
             vertex = centre - (right - left) ** 2 / (8 * curvature)

@@ -27,9 +27,6 @@ from .settling import (
 )
 
 OPEN_LOOP_MESSAGE = "the friction loop of the last cycle does not close"
-# Safety factor for the proposed number of cycles of a decay, because the last amplitudes may
-# contain a beat.
-PROPOSED_CYCLES_SAFETY_FACTOR = 1.5
 # Round-off error of an amplitude, relative to the displacement a/omega^2 of the drive.
 AMPLITUDE_ROUND_OFF = 1e-12
 
@@ -354,7 +351,8 @@ def describe_ringing(ratio: float, limits: tuple[float, float], cycles: float) -
     advice = 'set accuracy.method = "harmonic" for the steady motion'
     # Largest number of cycles that a message proposes.
     if more_cycles < 1e6:
-        proposed = float(f"{cycles + PROPOSED_CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
+        # The last amplitudes may contain a beat, hence the factor 1.5
+        proposed = float(f"{cycles + 1.5 * more_cycles:.2g}")
         advice = f"set drive.cycles = {proposed:g}"
     return (
         f"the interface sticks, but the amplitude has not settled: by up to {100 * ratio:.2g} % (limit "

@@ -23,7 +23,6 @@ ACCELERATION_MEASURES = tuple(
     name for name in CYCLE_MEASURES if MOTION_TABLE[name].group == "motion"
 )
 ALWAYS_STICKS_REASON = "the whole interface sticks throughout the last cycles"
-UNBOUNDED_REASON = "no bounded motion exists at this drive"
 OUTPUT_AT_REST_REASON = (
     "the output does not move: "
     "the first harmonic of its acceleration is 0 within the accuracy of the computation"
@@ -167,7 +166,9 @@ def find_missing_unbounded(values) -> Measures:
     """Return the measures of a motion that grows without bound: all lose their values except the normal load."""
     out = {}
     for name, measure in values.items():
-        out[name] = replace(measure, value=None, error=None, reason=UNBOUNDED_REASON)
+        out[name] = replace(
+            measure, value=None, error=None, reason="no bounded motion exists at this drive"
+        )
     if "normal_load" in values:
         out["normal_load"] = replace(values["normal_load"], error=None)
     return out

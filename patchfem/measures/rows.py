@@ -233,17 +233,11 @@ FUNCTIONS = {
     "normal_load_peak": lambda s: s.evaluate_load(np.max),
     "open_fraction": lambda s: s.evaluate_load(lambda load: np.mean(load <= 0)),
 }
-# Sizes of the larger terms by their names in measures.toml, and functions of the measures of an interface that return the
-# others, by measure
-LARGER_TERMS = {"1": 1.0, "pi": np.pi}
+# Functions of the measures of an interface that return larger terms, by measure
 LARGER_TERM_FUNCTIONS = {
     "drift_per_cycle": _find_drift_scale,
     "equivalent_stiffness": lambda values: np.nan_to_num(values.get("harmonic_force_ratio", 0.0)),
 }
-SCATTER_TEXT = (
-    "half-width of the 95 % interval of {}: the scatter between random drives of the same length with "
-    "different seeds"
-)
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
@@ -256,7 +250,10 @@ def _read_motion_rows() -> Iterator[MeasureDefinition]:
         if row.has("scatter"):
             # The tolerance of a scatter refers to its measure, because the scatter itself may be near 0.
             yield row._replace(
-                name=f"{name}_scatter", text=SCATTER_TEXT.format(name), larger_term=name
+                name=f"{name}_scatter",
+                text=f"half-width of the 95 % interval of {name}: the scatter between random drives of the same length "
+                "with different seeds",
+                larger_term=name,
             )
 
 
@@ -348,7 +345,7 @@ def find_larger_term(name: str, values: Values):
     first = remove_interface_number(name)
     if first in LARGER_TERM_FUNCTIONS:
         return LARGER_TERM_FUNCTIONS[first](own)
-    return LARGER_TERMS.get(term, np.abs(own.get(term, 0.0)))
+    return {"1": 1.0, "pi": np.pi}.get(term, np.abs(own.get(term, 0.0)))
 
 
 def find_subtracted_terms(name: str, values: Values):

@@ -13,13 +13,6 @@ from ..core import Outcome, max_abs
 MOTION_CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY_CLASS = 1  # Index of Outcome.STEADY in MOTION_CLASSES.
 GROWS_CLASS = 2  # Index of Outcome.GROWS in MOTION_CLASSES.
-# Number of the last windows from which a steady amplitude is extrapolated.
-N_FINAL_WINDOWS = 5
-# Largest speed at which an interface counts as stuck, relative to the largest speed in the run.
-MAX_STUCK_SPEED_RATIO = 1e-3
-# Smallest remaining change of the amplitude, as a fraction of the tolerance, at which the steady estimate is
-# reported.
-MIN_REPORTED_CHANGE_FRACTION = 0.02
 
 
 class MotionEnds(NamedTuple):
@@ -60,10 +53,10 @@ def judge_motions(extremes, phasors, window: int, tolerance, floor, decay) -> Mo
     last = amplitude[:, -1]
     allowed = tolerance * last + floor
 
-    # The last cycles of the windows are extrapolated to infinite time, if they lie in the second half of the run: the
+    # The last cycles of five windows are extrapolated to infinite time, if they lie in the second half of the run: the
     # motion before them may decay in another way.
     steady = np.full((2, last.size), np.nan)
-    first = (N_FINAL_WINDOWS - 1) * window
+    first = 4 * window
     is_long = phasors.shape[1] > 2 * first
     if is_long:
         ends = slice(-1 - first, None, window)
@@ -89,7 +82,7 @@ def select_reported(steady, outcomes, amplitude, amplitude_error, tolerance) -> 
     """Return the steady amplitudes that are measures of n motions, with the errors of the computed amplitudes added.
 
     They are those of transient motions, and of steady motions whose amplitude will still change by more than
-    MIN_REPORTED_CHANGE_FRACTION times the tolerance. The relative error of the computed amplitude is also that of the
+    0.02 times the tolerance. The relative error of the computed amplitude is also that of the
     steady one.
 
     Parameters
@@ -110,7 +103,7 @@ def select_reported(steady, outcomes, amplitude, amplitude_error, tolerance) -> 
     """
     value, error = steady
     change = np.abs(value - amplitude) + error
-    is_changing = change > MIN_REPORTED_CHANGE_FRACTION * tolerance * np.abs(amplitude)
+    is_changing = change > 0.02 * tolerance * np.abs(amplitude)
     is_reported = (outcomes == Outcome.TRANSIENT) | ((outcomes == Outcome.STEADY) & is_changing)
     total = error + amplitude_error * value / np.maximum(np.abs(amplitude), 1e-300)
     return np.where(is_reported, [value, total], np.nan)
@@ -183,7 +176,7 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> np.ndarray:
 
     Parameters
     ----------
-    amplitudes, phasors : (n, N_FINAL_WINDOWS)
+    amplitudes, phasors : (n, 5)
         Amplitudes [m] and phasors [m] of the last cycle of the last windows. A phasor is the Fourier
         coefficient of the motion at the drive frequency.
 
@@ -444,7 +437,7 @@ def find_slip_period(time, rate) -> float:
 
     The result is 0 if there are fewer than two slip intervals, or if the last one started more than 1.5
     times this period before the end, so that the interface sticks. The interface slips while its rate
-    exceeds MAX_STUCK_SPEED_RATIO times the largest rate. A motion without stick has two slip intervals per cycle.
+    exceeds a thousandth of the largest rate. A motion without stick has two slip intervals per cycle.
 
     Parameters
     ----------
@@ -452,7 +445,7 @@ def find_slip_period(time, rate) -> float:
         Times [s] and rates of the relative displacement [m/s].
     """
     rate = np.asarray(rate, float)
-    direction = np.sign(rate) * (np.abs(rate) > MAX_STUCK_SPEED_RATIO * max_abs(rate))
+    direction = np.sign(rate) * (np.abs(rate) > 1e-3 * max_abs(rate))
     time = np.asarray(time, float)
     start_steps = np.flatnonzero((direction[1:] != 0) & (direction[1:] != direction[:-1]))
     # slip starts at the last sample of the preceding stick interval

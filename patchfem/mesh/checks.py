@@ -16,8 +16,6 @@ from .pieces import CellEdges, PieceMesh, compute_signed_areas, find_edges, free
 # Largest slope of a rounded edge within the interface; the normal and the vertical gap then differ
 # by half a percent
 MAX_ROUNDED_SLOPE = 0.1
-# Tags of a file in the message on a missing tag
-MAX_LISTED_TAGS = 12
 # Largest distances of the node of an edge of second order from the middle of the edge, as fractions of its length: along
 # the edge, where it moves the stresses, and across, where the edge may be an arc of a rounded end of up to 45 degrees
 MAX_MIDDLE_NODE_SHIFT = 0.01
@@ -138,7 +136,7 @@ def _check_tags(mesh: TaggedMesh) -> None:
         known_tags = sorted((names | set(mesh.edges)) - {""})
         raise PatchfemError(
             f"no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: {mesh.tag_help}; tags in the "
-            f"file: {', '.join(known_tags[:MAX_LISTED_TAGS]) or 'none'})"
+            f"file: {', '.join(known_tags[:12]) or 'none'})"
         )
 
     # Cells without a known tag have no material. Edges may have any tag.

@@ -24,8 +24,6 @@ LINE_ELEMENT_NODE_COUNTS |= {"T2D3": 3, "T3D3": 3, "B22": 3, "B32": 3}
 # Names of the elements in meshio by their number of nodes
 MESHIO_PLANE_NAMES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}
 MESHIO_LINE_NAMES = {2: "line", 3: "line3"}
-PART_KEYWORDS = ("PART", "ASSEMBLY", "INSTANCE")
-UNSUPPORTED_KEYWORDS = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY")
 
 
 class Deck:
@@ -56,12 +54,12 @@ class Deck:
         `parameters` are the words KEY=VALUE after the keyword, and `lines` the words of the data lines. Blocks that
         say nothing about nodes, elements, sets or surfaces are ignored.
         """
-        if keyword in PART_KEYWORDS:
+        if keyword in ("PART", "ASSEMBLY", "INSTANCE"):
             raise PatchfemError(
                 f"*{keyword}: parts and instances are not read; in Abaqus/CAE "
                 "mdb.models['Model-1'].setValues(noPartsInputFile=ON) writes a flat deck"
             )
-        if keyword in UNSUPPORTED_KEYWORDS:
+        if keyword in ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY"):
             raise PatchfemError(
                 f"*{keyword} is not supported yet; write a flat deck (without parts and instances)"
             )

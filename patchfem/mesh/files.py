@@ -21,8 +21,6 @@ from .pieces import find_edges
 
 # Largest size of a mesh file [bytes]; meshes of two plane pieces are smaller
 MAX_FILE_BYTES = 256 * 2**20
-# Smallest size [bytes] of an entry in these sections of a .msh file
-MIN_ENTRY_BYTES = {b"$Nodes": 6, b"$Elements": 4}
 LINE_NAMES = ("line", "line3")  # names of lines in meshio
 
 
@@ -259,7 +257,8 @@ def _check_counts(path: Path) -> None:
     Otherwise meshio would reserve the memory for all of them.
     """
     content = path.read_bytes()
-    for section, min_bytes in MIN_ENTRY_BYTES.items():
+    # Smallest size [bytes] of an entry in these sections
+    for section, min_bytes in {b"$Nodes": 6, b"$Elements": 4}.items():
         start = content.find(section)
         lines = content[start + len(section) : start + len(section) + 80].split(b"\n")
         if start < 0 or len(lines) < 2:

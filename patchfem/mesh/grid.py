@@ -17,14 +17,12 @@ from ..core import frozen_array
 from .ends import SHARP_END, End
 from .grading import Layout, RowHeights, divide_interval, divide_into_rows, tributary_lengths
 
-COLUMN_LENGTH_RATIO = 1.1  # ratio of the lengths of successive columns beyond the interface, unless another one is given
 # Number of equal columns beyond which the rows become shorter with the columns; with fewer columns
 # the rows stay as short, which costs little
 N_REFERENCE_COLUMNS = 32
 # Growth of the rows with the distance from a face, for N_REFERENCE_COLUMNS columns; with 0.2 there
 # are a fifth more rows for the same error of the compliance
 ROW_HEIGHT_GROWTH = 0.3
-N_COATING_ROWS = 4  # ratio of the thickness of a coating to the rows at its inner face
 MIN_PIECE_ROWS = 6  # smallest number of rows of a piece
 
 
@@ -182,7 +180,7 @@ class TensorGrid:
             outer=frozen_array(change(self.outer)),
         )
 
-    def extend(self, length: float, end: End, growth: float = COLUMN_LENGTH_RATIO) -> "TensorGrid":
+    def extend(self, length: float, end: End, growth: float = 1.1) -> "TensorGrid":
         """Return the grid of a piece of which this one is the part over the interface.
 
         The interface lies in the middle of the piece. The first column beyond the interface is as long
@@ -246,7 +244,7 @@ def make_graded_grid(
     rows = RowHeights(
         first=scale * reference_cell,
         last=scale * reference_cell,
-        coating=scale * min(reference_cell, coating_thickness / N_COATING_ROWS),
+        coating=scale * min(reference_cell, coating_thickness / 4),  # four rows at its inner face
         largest=scale * height / MIN_PIECE_ROWS,
         growth=scale * ROW_HEIGHT_GROWTH,
     )

@@ -16,8 +16,6 @@ from .gap import ShapedGap
 from .patch import PatchModel
 from .source import cache_by_file, name_key
 
-SCAN_KEY = "contact.profile.scan"
-
 
 def compute_face_gap(patch: PatchModel, x: np.ndarray, y: np.ndarray) -> ShapedGap:
     """Compute the gap of the unloaded faces at equal cells.
@@ -46,7 +44,7 @@ def compute_face_gap(patch: PatchModel, x: np.ndarray, y: np.ndarray) -> ShapedG
 
     # A scan that is larger than the face is cropped, and a smaller one goes on with its last heights.
     begin = process_time()
-    with name_key(SCAN_KEY):
+    with name_key("contact.profile.scan"):
         part = read_face(scan.path, scan.at, patch.pieces.length, patch.pieces.width)
     sign = -1.0 if scan.is_material else 1.0
     measured = sign * average_over_cells(part, x, y)
@@ -93,8 +91,7 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
     x = scan.x - middle[0]
     y = scan.y - middle[1]
     covered = _covered_length(x, length) * _covered_length(y, width) / (length * width)
-    # Smallest share of the face that a scan covers; a smaller one says little about the other
-    # heights.
+    # Smallest share of the face that a scan covers; a smaller one says little about the other heights.
     if covered < 0.5:
         size = f"{format_length(np.ptp(x))} x {format_length(np.ptp(y))}"
         face = f"{format_length(length)} x {format_length(width)}"
@@ -118,8 +115,7 @@ def read_face(path, at: tuple[float, float] | None, length: float, width: float)
     notes = list(part.notes)
     if spikes.any():
         notes.append(f"{scan.source}: {int(spikes.sum())} heights of spikes were removed")
-    # Share of a face below which missing heights at its sides are not reported; a row of a usual
-    # scan is more.
+    # Share of a face below which missing heights at its sides are not reported; a row of a usual scan is more.
     if 1 - covered > 1e-3:
         notes.append(
             f"{scan.source}: the scan does not cover {100 * (1 - covered):.2g} % of the face, at its sides; the nearest "

@@ -132,16 +132,17 @@ def make_bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float
     -------
     friction.bonds.parameters.Bonds
     """
-    rest_speed = law.rest_speed or max(REST_SPEED_FRACTION * peak_speed, min_rest_speed)
+    growth = None
+    if law.rest_growth is not None:
+        rest_speed = law.rest_speed or max(REST_SPEED_FRACTION * peak_speed, min_rest_speed)
+        growth = friction.bonds.parameters.BondGrowth(law.rest_growth, law.slip_growth, rest_speed)
     return friction.bonds.parameters.Bonds(
         law.static,
         law.bond_length,
         law.order,
         law.reading,
         law.kinetic / law.static if law.static > 0 else 1.0,
-        law.rest_growth,
-        law.slip_growth,
-        rest_speed,
+        growth,
         law.initial_bonds,
     )
 

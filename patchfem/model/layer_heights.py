@@ -13,8 +13,6 @@ from .patch import PatchModel
 from .profile import list_short_wave_heights
 from .source import cache_by_file, name_key
 
-HEIGHTS_KEY = "contact.asperities.heights"
-
 
 def read_layer_heights(patch: PatchModel) -> np.ndarray:
     """Return the heights (k,) [m] of the rough layer of a patch at equal distances; larger heights are more material.
@@ -28,7 +26,7 @@ def read_layer_heights(patch: PatchModel) -> np.ndarray:
     """
     skin = patch.interface.skin
     if skin.heights is not None:
-        with name_key(HEIGHTS_KEY):
+        with name_key("contact.asperities.heights"):
             return read_heights(Path(skin.heights), skin.cutoff)
     gap = patch.gap
     ends = np.array([-0.5, 0.5]) * patch.pieces.length

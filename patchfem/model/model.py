@@ -352,7 +352,7 @@ def write_resolved(
     """
     friction = scene.friction
     if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
-        friction = friction.model_copy(update={"rest_speed": float(model.bonds.rest_speed)})
+        friction = friction.model_copy(update={"rest_speed": float(model.bonds.growth.rest_speed)})
     tables = {"friction": friction, "structure": scene.structure}
     for key, value in joint.items():
         name, *pieces = key.split(".")

@@ -18,10 +18,6 @@ from ..surface.spectrum import MIN_ELEMENTS_PER_WAVE, describe_lost_waves, wave_
 from .source import cache_by_file, name_key
 
 CURVE_POINTS_PER_CELL = 16  # number of line segments per cell that represent a smooth profile
-# Standard deviation of heights [m] below which they are round-off of a straight line.
-MIN_HEIGHT_DEVIATION = 1e-10
-# Largest standard deviation of the heights of a straight profile, relative to their range.
-MAX_STRAIGHT_PROFILE_DEVIATION = 1e-5
 
 
 class _LevelledProfile(NamedTuple):
@@ -220,9 +216,8 @@ def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelled
             f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
             "tilt, give [contact.tilt]",
         )
-    is_straight = np.std(trace.z) <= max(
-        MIN_HEIGHT_DEVIATION, MAX_STRAIGHT_PROFILE_DEVIATION * np.ptp(raw.z)
-    )
+    # Deviations below 1e-10 m, or 1e-5 of the range, are round-off of a straight line
+    is_straight = np.std(trace.z) <= max(1e-10, 1e-5 * np.ptp(raw.z))
 
     # Beyond its ends the trace is continued at constant height.
     n_before = int(trace.x[0] > x[0])

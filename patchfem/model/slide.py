@@ -14,13 +14,6 @@ from ..core import Missing, array_dataclass
 from ..scene.rules.methods import find_climbed_grooves
 from .source import cache_by_file, name_key
 
-# Number of steps per leg at rest; the growth of bonds at rest, eq. (2.10), is exact for any step.
-STEPS_PER_HOLD = 4
-# Number of steps per cycle that gives an error of about REFERENCE_ERROR
-REFERENCE_STEPS_PER_CYCLE = 400
-# Relative error with REFERENCE_STEPS_PER_CYCLE; it falls with the square of the time step.
-REFERENCE_ERROR = 1e-3
-STEPS_PER_BOND_LENGTH = 20  # number of steps while the slide covers the length of a bond
 MAX_BENCH_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
 MAX_PATH_SAMPLES = 20_000_000  # largest number of samples in a path; more take too much memory
 MAX_SLIDE_SAMPLES = 5_000_000  # largest number of samples in a slide; more take too much memory
@@ -159,15 +152,16 @@ class SlidePath:
         min_steps = 0 if legs is None else 8 * (legs[0].size - 1)
         if pinned_steps is not None:
             return 4 * ceil(max(pinned_steps, min_steps) / 4)
-        per_cycle = REFERENCE_STEPS_PER_CYCLE * sqrt(REFERENCE_ERROR / tolerance)
+        # 400 steps give an error of about 1e-3, which falls with the square of the time step
+        per_cycle = 400 * sqrt(1e-3 / tolerance)
         cycles = 1.0
         if legs is not None:
             path = float(np.abs(np.diff(legs[1])).sum())
             cycles = max(1.0, path / (2 * float(np.ptp(legs[1]))))
             if length:
-                # Largest number of bond lengths per cycle that STEPS_PER_BOND_LENGTH resolves.
+                # 20 steps resolve the length of a bond, for at most 1000 lengths per cycle
                 bond_lengths = min(path / cycles / length, 1000)
-                per_cycle = max(per_cycle, STEPS_PER_BOND_LENGTH * bond_lengths)
+                per_cycle = max(per_cycle, 20 * bond_lengths)
         # Smallest number of steps per cycle, which resolves the loop at any tolerance.
         per_cycle = min(max(per_cycle, 100), MAX_BENCH_STEPS_PER_CYCLE)
         return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)
@@ -234,8 +228,8 @@ def read_path_file(path: Path) -> tuple[np.ndarray, np.ndarray]:
 def _sample_legs(time, rel_disp, steps: int) -> SlideSamples:
     """Sample the straight segments (legs) between corners at given times [s] and displacements [m].
 
-    Half of the steps are spread by length, half evenly over the legs that move. A leg at rest gets
-    `STEPS_PER_HOLD` steps.
+    Half of the steps are spread by length, half evenly over the legs that move. A leg at rest gets four steps, because the
+    growth of bonds at rest, eq. (2.10), is exact for any step.
 
     `time` and `rel_disp` (k,) are those of the corners, and `steps` is the number of steps in all.
     """
@@ -243,7 +237,7 @@ def _sample_legs(time, rel_disp, steps: int) -> SlideSamples:
     fraction = length / length.sum() / 2 + 1 / (2 * np.count_nonzero(length))
     # A number of steps that is exactly an integer has a relative round-off below 1e-12.
     moving_steps = np.maximum(1, np.ceil(steps * fraction * (1 - 1e-12)))
-    leg_steps = np.where(length > 0, moving_steps, STEPS_PER_HOLD).astype(int)
+    leg_steps = np.where(length > 0, moving_steps, 4).astype(int)
     corner_index = np.concatenate([[0], np.cumsum(leg_steps)])
     index = np.arange(corner_index[-1] + 1)
     return SlideSamples(

@@ -10,9 +10,6 @@ from ..core import NotConverged, PatchfemError, array_dataclass
 from ..scene.keys.lines import locate_key, number_items_from_one
 from ..scene.sets import format_values
 
-# Number of cached results of each function; results for large traces and modes take much memory.
-MAX_CACHED_FILES = 8
-
 Content = TypeVar("Content")  # what a function reads from a file
 
 
@@ -112,7 +109,8 @@ def cache_by_file(function: Callable[..., Content]) -> Callable[..., Content]:
     be hashable, and are passed by position.
     """
 
-    @lru_cache(MAX_CACHED_FILES)
+    # Results for large traces and modes take much memory
+    @lru_cache(8)
     def call_cached(paths, _versions, *arguments):
         """Call the function, unless its result is cached for these paths, versions of files and arguments."""
         return function(paths, *arguments)

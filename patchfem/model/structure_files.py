@@ -18,9 +18,6 @@ from ..structure.modes import PATCH_MOTIONS
 from ..structure.places import DIRECTION_NAMES
 from .source import cache_by_file, name_key
 
-NODE_PATTERN = re.compile(r"(\d+)(?::(r?[xyz]))?")  # pattern of "1201:x" or "1201"
-NODE_RANGE_PATTERN = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")  # pattern of "a..b" or "a..b:n"
-
 
 class FileModes(NamedTuple):
     """Modes from a file, with sentences for the user on what was neglected or changed."""
@@ -379,7 +376,8 @@ def _find_moved_rows(name, n: int, places) -> np.ndarray:
     not known.
     """
     text = str(name)
-    row_range = NODE_RANGE_PATTERN.fullmatch(text)
+    # Such as "a..b" or "a..b:n"
+    row_range = re.fullmatch(r"(\d+)\.\.(\d+)(?::(\d+))?", text)
     if row_range is None:
         if places is not None and text in DIRECTION_NAMES:
             return np.flatnonzero(places[:, 1] == DIRECTION_NAMES.index(text) + 1)
@@ -427,7 +425,8 @@ def _find_rows(name, n: int, places) -> np.ndarray:
             f"'{name}' names a node, but the files name no nodes; give row numbers of the matrices, "
             "which start at 1"
         )
-    match = NODE_PATTERN.fullmatch(name)
+    # Such as "1201:x" or "1201"
+    match = re.fullmatch(r"(\d+)(?::(r?[xyz]))?", name)
     if match is None:
         raise PatchfemError(
             f"'{name}' is not a node with a direction; write node:direction, such as \"1201:x\""

@@ -27,18 +27,8 @@ LOADING_KEYS = (
     "load_line",
     "plane",
 )
-# Keys of [contact] that may be written differently; the gap shows
-# whether the surfaces are the same.
-SURFACE_KEYS = (
-    "tilt",
-    "profile",
-    "mesh",
-    "mesh_unit",
-)
 # Largest difference between the gaps of one patch on two meshes, relative to the range of the gap.
 GAP_DIFFERENCE_FRACTION = 1e-2
-# Exceptions of h5py, json and tomllib for a file of another kind.
-FOREIGN_ERRORS = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
 
 
 @array_dataclass
@@ -162,7 +152,8 @@ def read_end_state(path: Path) -> EarlierWear:
                 measures=json.loads(file.attrs["measures"]),
             )
         is_usable = _has_depth_over_axes(earlier) and "cycles" in earlier.scene["wear"]
-    except FOREIGN_ERRORS:
+    # Exceptions of h5py, json and tomllib for a file of another kind
+    except (OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError):
         raise PatchfemError(
             f"{path}: not the result.nc of a run with [wear] and [contact]; give such a file",
             WEAR_START_KEY,
@@ -218,7 +209,8 @@ def _describe_pieces(scene: dict[str, dict[str, Any]]) -> dict[str, Any]:
     pieces = {
         f"contact.{key}": value
         for key, value in scene["contact"].items()
-        if key not in LOADING_KEYS and key not in SURFACE_KEYS
+        # Shapes may be written differently; the gap shows whether the surfaces are the same
+        if key not in (*LOADING_KEYS, "tilt", "profile", "mesh", "mesh_unit")
     }
     # Paths are relative to the folder of each run.
     for key, names in (("contact.area", ("cells",)), ("contact.asperities", ("from", "heights"))):

@@ -9,8 +9,6 @@ import numpy as np
 
 from ..core import frozen_array
 
-# Smallest compliance of a spring relative to that of its node: a node does not become much stiffer.
-MIN_SPRING_COMPLIANCE_RATIO = -0.5
 # Largest compliance of a spring relative to that of its node, which then carries no force.
 MAX_SPRING_COMPLIANCE_RATIO = 1e6
 
@@ -55,8 +53,8 @@ def add_edge_springs(compliance: np.ndarray, is_loaded: np.ndarray, stiffness: f
         """
         return excess - float((weight * ratio / (1 + ratio * values)).sum())
 
-    # The matrix is positive definite above -1/lambda_max.
-    low = max(MIN_SPRING_COMPLIANCE_RATIO, -0.5 / values.max(initial=1.0))
+    # The matrix is positive definite above -1/lambda_max, and no node becomes much stiffer
+    low = max(-0.5, -0.5 / values.max(initial=1.0))
     if not remaining_excess(low) > 0 > remaining_excess(MAX_SPRING_COMPLIANCE_RATIO):
         return frozen_array(compliance * (forces.sum() / stiffness))
 

@@ -19,12 +19,8 @@ SLIP = 2  # State of a cell at its friction limit
 # Number of cells along the face per displacement of the first loading, so that the changes between grids contain the error
 # of its curve: with 16 displacements on every grid 43 of 60 loop areas held
 CELLS_PER_LEVEL = 8
-MIN_LOADING_LEVELS = 4  # displacements on a grid of 32 cells
-N_SLIDERS = 256  # Number of yield displacements of the parallel elements
 # Largest wrong displacement of a cell, relative to the largest one; the error of the force is about its square
 SLIP_RESIDUAL_TOL = 1e-7
-# Smallest stiffness of an element relative to their sum; smaller ones are rounding errors of the slope of a curve
-MIN_STIFFNESS_RATIO = 1e-12
 
 
 class FirstLoading(NamedTuple):
@@ -149,7 +145,8 @@ def find_first_loading(compliance: CellCompliance, limit: np.ndarray) -> FirstLo
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     gross_slip = float(compliance.product(limit)[is_closed].max())
     n_levels = max(limit.shape) // CELLS_PER_LEVEL
-    displacements = gross_slip * _space_evenly_at_ends(max(n_levels, MIN_LOADING_LEVELS))
+    # Those of a grid of 32 cells are the fewest
+    displacements = gross_slip * _space_evenly_at_ends(max(n_levels, 4))
     force = np.zeros((displacements.size, np.count_nonzero(is_closed)))
     work = np.zeros(displacements.size)
     traction = np.zeros(limit.shape)
@@ -232,7 +229,8 @@ def make_spring_sliders(displacement, force) -> SpringSliders:
     steps = np.diff(displacement)
     slopes = isotonic_regression(np.diff(force) / steps, weights=steps, increasing=False).x
     stiffness = -np.diff(slopes, append=0.0)
-    is_kept = stiffness > MIN_STIFFNESS_RATIO * slopes[0]
+    # Smallest stiffness of an element relative to their sum; smaller ones are rounding errors of the slope of a curve
+    is_kept = stiffness > 1e-12 * slopes[0]
     stiffness = stiffness[is_kept]
     yields = displacement[1:][is_kept]
     # The friction limit is that of the curve
@@ -246,7 +244,8 @@ def _interpolate_force(loading: FirstLoading) -> np.ndarray:
     from scipy.interpolate import CubicHermiteSpline
 
     displacement, force, work = loading
-    knots = displacement[-1] * _space_evenly_at_ends(N_SLIDERS)
+    # One yield displacement of the parallel elements at each knot
+    knots = displacement[-1] * _space_evenly_at_ends(256)
     curve = CubicHermiteSpline(displacement, work, force.sum(axis=1)).derivative()
     return np.array([knots, curve(knots)])
 

@@ -34,7 +34,7 @@ STEP_ROUND_OFF = 1e-9  # remainder of a cycle relative to a step that belongs to
 # Velocity that is round-off, relative to its change by the acceleration at the end of a step
 STOP_ROUND_OFF = 1e-10
 MAX_STEP_PHASE = 1.0  # largest phase of the vibration of a sticking point in an exact step [rad]
-MAX_STEPS = 256  # largest number of exact steps per cycle
+MAX_EXACT_STEPS = 256  # largest number of exact steps per cycle
 MAX_ROOT_STEPS = 60  # secants and bisections for an event
 # Product of the last two changes of the instant of an event, relative to the step, by about which the next secant would
 # change it: round-off, and for a smooth law less than the error of the step
@@ -200,7 +200,7 @@ def make_body(case, law, steps):
     if numbers[LawNumber.LAW] <= Law.JENKINS:
         # More steps resolve the vibration of a sticking point.
         ratio = sqrt(case[Number.STIFFNESS] + added) / case[Number.OMEGA]
-        count = min(max(steps, 2 * pi * ratio / MAX_STEP_PHASE), MAX_STEPS)
+        count = min(max(steps, 2 * pi * ratio / MAX_STEP_PHASE), MAX_EXACT_STEPS)
     step = 2 * pi / case[Number.OMEGA] / count
     slip = make_regime(case, 0.0, step)
     stick = make_regime(case, added, step)

@@ -18,7 +18,7 @@ from .motion_kernels import Goal, find_rest, is_linear, locate, rotate, sample
 from .rows import Energy, Law, LawNumber, Loop, Number, Seen
 
 STEP_ROUND_OFF = 1e-9  # distance of a parabola from the ends of a piece relative to its width
-N_PARABOLAS = 5  # further parabolas for an extreme of force or acceleration, each four times as narrow as the last
+N_NARROWER_PARABOLAS = 5  # further parabolas for an extreme of force or acceleration, each four times as narrow as the last
 # Distance of a vertex from the middle of three points, relative to their spacing, up to which it is searched
 MAX_VERTEX_OFFSET = 1.5
 SAME_SLIDE = 1e-12  # relative difference of slides that is round-off
@@ -272,7 +272,7 @@ def find_peak(body, piece, weights, known):
     centre = 0.5
     half = 0.5
     peak = known
-    for _ in range(1 + N_PARABOLAS):
+    for _ in range(1 + N_NARROWER_PARABOLAS):
         before = read_signal(body, piece, centre - half, weights)
         middle = read_signal(body, piece, centre, weights)
         after = read_signal(body, piece, centre + half, weights)

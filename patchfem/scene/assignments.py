@@ -27,23 +27,18 @@ from .reader import is_toml, read_set_value
 from .suggestions import require_key
 
 # keys of a length and of a force whose values `read_positive_values` reads, with an example
-LENGTH_KEY = "drive.displacement"
-POSITIVE_KEYS = {"length": (LENGTH_KEY, "1 um..1 mm:9"), "force": ("drive.force", "1 N..100 N:9")}
+POSITIVE_KEYS = {
+    "length": ("drive.displacement", "1 um..1 mm:9"),
+    "force": ("drive.force", "1 N..100 N:9"),
+}
 # Largest number of cases of a sweep; the hashes and columns of more cases take gigabytes.
 MAX_CASES = 3_000_000
-# Number of significant digits of a value, so that a tenth of a range is
-# 0.1 and not 0.1000000000000001.
-SIGNIFICANT_DIGITS = 15
 # Pattern of a number
 _NUMBER_PATTERN = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 # Pattern of a range: first..last, with :count and the spacing log or lin
 _RANGE_PATTERN = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
 # Pattern of a number with a unit
 _QUANTITY_PATTERN = re.compile(rf"{_NUMBER_PATTERN}\s*(.*)")
-# Pattern of a sign before a tolerance, which is not accepted
-_TOLERANCE_PATTERN = re.compile(r"\+/?-|±")
-# Sign that closes a list, an inline table or a text, by the sign that opens it
-_CLOSING_SIGNS = {"[": "]", "{": "}", '"': '"', "'": "'"}
 
 
 class Form(NamedTuple):
@@ -286,7 +281,8 @@ def read_values(key: str, text: str, form: Form = LIST_FORM) -> Axis | Range:
         raise ValueError(
             "is not a number that can vary; only quantities and plain numbers can be free"
         )
-    if reader.is_number and _TOLERANCE_PATTERN.search(text):
+    # The sign of a tolerance
+    if reader.is_number and re.search(r"\+/?-|±", text):
         raise ValueError(describe_removed("value with a tolerance", f"{text}: a tolerance"))
     if form.has_ranges and len(pieces) == 1:
         spread = reader.parse_range(text.strip())
@@ -490,7 +486,8 @@ def _split_at_commas(text: str) -> list[str]:
     opened = ""
     for part in text.split(","):
         opened += part
-        closing = _CLOSING_SIGNS.get(opened.strip()[:1])
+        # Sign that closes a list, an inline table or a text
+        closing = {"[": "]", "{": "}", '"': '"', "'": "'"}.get(opened.strip()[:1])
         if closing is None or (closing in part and is_toml(opened)):
             pieces.append(opened.strip())
             opened = ""
@@ -506,5 +503,5 @@ def _format_with_unit(value: float, unit: str) -> str:
 
 
 def _round_digits(value: float) -> float:
-    """Return the number `value` rounded to SIGNIFICANT_DIGITS."""
-    return float(f"{value:.{SIGNIFICANT_DIGITS}g}")
+    """Return the number `value` rounded to 15 digits, so that a tenth of a range is 0.1 and not 0.1000000000000001."""
+    return float(f"{value:.15g}")

@@ -17,8 +17,6 @@ from .keys.values import TomlTable
 MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
 ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
 ASSUMED_MASS = "1 kg"  # modal mass for the modes of a scene without [structure]
-# Drive that a rig must have in a scene. No result of a backbone depends on it.
-UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
 KEYS_OF_MODES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
 # Names of modes that are given without names
 MODE_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth")
@@ -151,7 +149,8 @@ class BackboneTables:
         if self.modes:
             self._write_modes(raw)
         if "structure" in raw:
-            raw["drive"] = dict(UNUSED_DRIVE)
+            # A rig must have a drive, but no result of a backbone depends on it
+            raw["drive"] = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
 
     def _write_modes(self, raw: TomlTable) -> None:
         """Write the modes into the table [structure] of the plain values `raw` of a scene."""

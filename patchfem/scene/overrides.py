@@ -52,14 +52,13 @@ PLAIN_KEYS = {
 # Scenes in which PLAIN_KEYS holds, as conditions of `rules.together`: a pressed patch, alone or in a rig, or a rig with one
 # contact point. The rig has modes and a sinusoidal base motion.
 _PRESSED_PATCH = "!wear & contact & !contact.load_line.moment & !contact.area & !contact.grooves"
-_HELD_PATCH = "contact.load & !contact.load_line & !contact.holder"
 _MOVED_BASE = (
     "kind=rig & !wear & structure.mode & !structure.interface & !structure.measured=stuck & drive.kind=base & "
     "!drive.duration & !friction.temperature & !friction.spread"
 )
 PLAIN_SCENES = (
     f"kind=patch & {_PRESSED_PATCH}",
-    f"{_MOVED_BASE} & {_PRESSED_PATCH} & {_HELD_PATCH} & !structure.bonded",
+    f"{_MOVED_BASE} & {_PRESSED_PATCH} & contact.load & !contact.load_line & !contact.holder & !structure.bonded",
     f"{_MOVED_BASE} & normal & !normal.grooves",
 )
 

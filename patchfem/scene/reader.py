@@ -34,11 +34,6 @@ from .keys.values import TomlTable, TomlValue
 from .rules.scene_draft import SceneDraft
 from .suggestions import describe_unknown_key
 
-# Numbers such as .3 and 5., which people write but TOML does not allow.
-_BARE_POINT_PATTERN = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")
-# String in quotes without escapes.
-_PLAIN_TEXT_PATTERN = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')
-
 
 def read_tables(draft: SceneDraft) -> None:
     """Read all tables of a scene draft, and collect the mistakes in them there."""
@@ -252,12 +247,15 @@ def read_set_value(key: str, text: str) -> TomlValue:
     """
     known = find_key(key)
     is_text_key = known is not None and str in known.types
-    if _PLAIN_TEXT_PATTERN.fullmatch(text):
+    # A string in quotes without escapes
+    if re.fullmatch(r'"[^"\\\x00-\x1f\x7f]*"', text):
         return text[1:-1]
     try:
         content = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
-        return float(text) if _BARE_POINT_PATTERN.fullmatch(text) and not is_text_key else text
+        # People write numbers such as .3 and 5., which TOML does not allow
+        is_bare = re.fullmatch(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?", text)
+        return float(text) if is_bare and not is_text_key else text
     value = content["value"]
     # TOML takes the end of "26#" for a comment.
     is_cut = "#" in text and not is_toml(f"[{text}]")

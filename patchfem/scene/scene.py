@@ -37,9 +37,6 @@ __all__ = [
     "read_sweep_axes",
 ]
 
-# Largest number of characters of the effects and the --set values in the repr of a Scene.
-MAX_LISTED_CHARACTERS = 160
-
 
 @dataclass(frozen=True)
 class Scene:
@@ -79,7 +76,7 @@ class Scene:
 
     def __repr__(self) -> str:
         words = ", ".join((*self.effect_names(), *self.sets))
-        return f"Scene of {self.path.name}: {self.kind}; {shorten(words, MAX_LISTED_CHARACTERS)}"
+        return f"Scene of {self.path.name}: {self.kind}; {shorten(words, 160)}"
 
     def with_(self, **sets: TomlValue) -> Scene:
         """Return a copy of the scene with the values of the given keys replaced.

@@ -20,7 +20,6 @@ from .keys.types import (
     list_keys,
 )
 
-SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 # Words of a schema that restrict a number.
 NUMBER_SCHEMA_WORDS = ("type", "exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
 # Regular expressions of all spellings of a part of a unit.
@@ -34,7 +33,12 @@ def make_schema() -> dict[str, Any]:
     definitions[Material.__name__] = _describe_material(definitions[Material.__name__])
     scene = _describe_table(Tables)
     scene["properties"]["sweep"] = _describe_sweep()
-    schema = {"$schema": SCHEMA_DIALECT, "title": "patchfem scene", **scene, "$defs": definitions}
+    schema = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "patchfem scene",
+        **scene,
+        "$defs": definitions,
+    }
     # Pydantic describes each table by itself, in which an inner table is only named.
     text = json.dumps(schema).replace(f'"{INNER_TABLE_WORD}": "', '"$ref": "#/$defs/')
     return json.loads(text)

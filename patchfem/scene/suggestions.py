@@ -21,11 +21,6 @@ from .keys.types import (
 )
 from .keys.values import TomlTable, TomlValue
 
-# Rating of a table whose name is similar to an unknown key. A table that knows all keys inside has 1.
-SIMILAR_NAME_RATING = 0.75
-# Rating of a table with the name of an unknown key, above all other ratings
-SAME_NAME_RATING = 2.0
-
 
 class UnknownKey(NamedTuple):
     """Sentence about an unknown key, and the key that it suggests; "" without a suggestion."""
@@ -217,11 +212,11 @@ def _suggest_table(model: type[Table], key: str, value: TomlValue) -> str:
     def rate(name: str) -> float:
         """Return how well the table `name` fits: the fraction of the given keys that it knows, plus a part for its name.
 
-        A name that is similar to the unknown one adds SIMILAR_NAME_RATING, and the same name SAME_NAME_RATING.
+        A name that is similar to the unknown one adds 0.75, and the same name 2, which is above all other ratings.
         """
         known = len(inside & list_keys(tables[name]).keys()) / max(len(inside), 1)
         is_same = name.rpartition(".")[2] == key
-        return known + SIMILAR_NAME_RATING * (name in similar) + SAME_NAME_RATING * is_same
+        return known + 0.75 * (name in similar) + 2.0 * is_same
 
     best = max((*similar, *tables), key=rate, default="")
     # Rating above which a table is suggested

@@ -14,21 +14,11 @@ from .rules.scene_draft import SceneError
 
 # Largest size of a scene file in bytes; larger data belong in files that the scene names.
 MAX_SCENE_FILE_BYTES = 4 * 2**20
-# Largest number of characters of a value in the advice on missing quotes.
-MAX_QUOTED_CHARACTERS = 60
-# Key with a value that opens neither quotes nor a bracket.
-_BARE_VALUE_PATTERN = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
-# Pattern of a number that lacks a digit before or after its point
-_DECIMAL_POINT_PATTERN = re.compile(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)")
-# Pattern of a number with a decimal comma
-_DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?\d+,\d+")
 # Pattern of a quantity or a word without quotes
 _QUANTITY_OR_WORD_PATTERN = re.compile(
     r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
     r"[a-zA-Z][\w./ -]*"
 )
-# Pattern of the position in an error message of tomllib
-_ERROR_POSITION_PATTERN = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
 def name_file(path: Path, folder: str | Path) -> str:
@@ -89,7 +79,7 @@ def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
     if isinstance(error, RecursionError):
         return f"{path}:1: not valid TOML: nested too deeply"
     message = str(error)
-    place = _ERROR_POSITION_PATTERN.search(message)
+    place = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
     line = text.count("\n") + (not text.endswith("\n"))
     where = ""
     if place:
@@ -103,17 +93,19 @@ def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
 
 def _advise_spelling(text: str, line: int) -> str:
     """Return how to write the value in a `line` of a text that lacks quotes or a digit, or "" for others."""
-    match = _BARE_VALUE_PATTERN.match([*text.split("\n"), ""][line - 1])
+    # A key with a value that opens neither quotes nor a bracket
+    match = re.match(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)", [*text.split("\n"), ""][line - 1])
     if match is None:
         return ""
     key = match[1]
     value = match[2].strip()
-    point = _DECIMAL_POINT_PATTERN.fullmatch(value)
+    # A number may lack a digit before or after its point
+    point = re.fullmatch(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)", value)
     if point and (point[2] or point[3]):
         number = f"{point[1]}{point[2] or 0}.{point[3] or 0}{point[4]}"
         return f"; put a digit on both sides of the point: {key} = {number}"
-    if _DECIMAL_COMMA_PATTERN.fullmatch(value):
+    if re.fullmatch(r"[-+]?\d+,\d+", value):
         return f"; write the decimal comma as a point: {key} = {value.replace(',', '.')}"
-    if _QUANTITY_OR_WORD_PATTERN.fullmatch(value) and len(value) < MAX_QUOTED_CHARACTERS:
+    if _QUANTITY_OR_WORD_PATTERN.fullmatch(value) and len(value) < 60:
         return f'; put a quantity or a word in quotes: {key} = "{value}"'
     return ""

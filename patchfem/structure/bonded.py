@@ -11,16 +11,6 @@ from .modes import make_basis
 # Smallest squared frequency of an elastic mode relative to the largest one; a mode with a smaller
 # one is rigid
 MIN_ELASTIC_FRACTION = 1e-12
-# Fields of a modal basis that are participations
-PARTICIPATION_FIELDS = (
-    "slide",
-    "base",
-    "output",
-    "gauge",
-    "normal",
-    "pitch",
-    "yaw",
-)  # fields of a basis whose rows run over its coordinates
 
 
 def add_spring(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> ModalBasis:
@@ -157,7 +147,9 @@ def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
     D = shapes.T @ (basis.damping_matrix + damper) @ shapes
     scale = size.T @ (np.abs(basis.damping_matrix) + np.abs(damper)) @ size
     zeta, damping = split_damping(trim_round_off(D, scale), omega)
-    rows = {key: getattr(basis, key) for key in (*PARTICIPATION_FIELDS, "faces")}
+    # Participations, whose rows run over the coordinates
+    names = ("slide", "base", "output", "gauge", "normal", "pitch", "yaw", "faces")
+    rows = {key: getattr(basis, key) for key in names}
     return make_basis(
         basis.names,
         basis.mass,

@@ -80,13 +80,7 @@ def build_basis(
         omega, normalized = decouple_modes(_require_finite(rows_per_root))
     phi = _divide_by_root(root, normalized, transpose=True)
 
-    # Damping in the coordinates of the modes.
-    D = np.zeros((n, n))
-    if damper_rows is not None:
-        D = _project_damper_rows(phi, np.asarray(damper_rows, float))
-    elif C is not None:
-        D = _project_damping_matrix(phi, _check_matrix(C, "C", M.shape))
-    phi, D = _decouple_equal_frequencies(phi, omega, D)
+    phi, D = _decouple_equal_frequencies(phi, omega, _project_damping(phi, C, damper_rows))
 
     # Rows of the interfaces and of the output; the sign of each mode follows from them.
     if faces is None:
@@ -120,6 +114,15 @@ def build_basis(
         faces=None if len(slides) == 1 else slides,
         shapes=phi,
     )
+
+
+def _project_damping(phi, C, damper_rows) -> np.ndarray:
+    """Return the damping matrix (n, n) in the coordinates of modes (n, n), from C (n, n) or rows of dampers (d, n)."""
+    if damper_rows is not None:
+        return _project_damper_rows(phi, np.asarray(damper_rows, float))
+    if C is not None:
+        return _project_damping_matrix(phi, _check_matrix(C, "C", phi.shape))
+    return np.zeros(phi.shape)
 
 
 def split_damping(D, omega) -> tuple[np.ndarray, np.ndarray | None]:

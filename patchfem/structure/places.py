@@ -10,16 +10,6 @@ from ..inputs.damage import list_some
 from ..inputs.universal import DIRECTION_NAMES
 from .modes import make_basis
 
-# Pattern of a node with a direction, such as "12:+x"
-DIRECTION_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")
-# Largest mass that the modes represent, as a fraction of the moving mass; a larger one shows that
-# the mass or the node of the base motion is wrong
-MAX_REPRESENTED_MASS_FRACTION = 1.05
-# Smallest mass that the modes represent, as a fraction of the moving mass, for which no note on
-# missing mass is given
-MIN_REPRESENTED_MASS_FRACTION = 0.8
-
-
 Motions = dict[tuple[int, int], np.ndarray]  # motions (n,) of the modes by (node, axis 0 to 5)
 
 
@@ -63,7 +53,8 @@ class MeasuredModes:
         # Sum of the motions at all directions that the text names, with their signs
         total = np.zeros(self.frequency.size)
         for part in text.split(","):
-            match = DIRECTION_PATTERN.fullmatch(part.strip())
+            # Such as "12:+x"
+            match = re.fullmatch(r"(\d+):([+-]?)(r?[xyz])", part.strip())
             if match is None:
                 raise PatchfemError(
                     f"'{text}' is not a node with a direction; write node:direction, such as "
@@ -134,7 +125,8 @@ def build_basis(
     output = rows.get("output_at", slide)
     base = -rows.get("force_at", output) if is_forced else rows.get("base_at", slide)
     mass_fraction = float(np.sum(base**2))
-    if not is_forced and mass_fraction > MAX_REPRESENTED_MASS_FRACTION:
+    # A larger mass shows that the mass or the node of the base motion is wrong
+    if not is_forced and mass_fraction > 1.05:
         raise PatchfemError(
             f"at this place the modes contain {mass_fraction:.4g} times structure.moving_mass, but at "
             "most 1 is possible; lower structure.moving_mass, or give the place of the moving mass",
@@ -161,7 +153,7 @@ def note_missing_mass(basis: ModalBasis) -> list[str]:
     The squares of `basis.base`, the participations of the base, add up to the fraction of the mass that they move [1].
     """
     mass_fraction = float(np.sum(basis.base**2))
-    if mass_fraction >= MIN_REPRESENTED_MASS_FRACTION:
+    if mass_fraction >= 0.8:
         return []
     return [
         f"the modes of structure.file contain {100 * mass_fraction:.0f} % of structure.moving_mass at base_at; the base "

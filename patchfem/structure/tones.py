@@ -2,7 +2,7 @@
 
 a(t) = sum_k a_k sin(2 pi f_k t + phi_k). Linear interpolation between rows h apart multiplies a tone by
 sinc^2(f h), which is compensated. It adds images at n/h +- f of the relative size (f h)^2; a mode of a
-lower frequency responds to them by (f h)^4, which is 6e-8 at `TONE_ROWS_PER_PERIOD` rows per period.
+lower frequency responds to them by (f h)^4, which is 6e-8 at 64 rows per period.
 """
 
 import numpy as np
@@ -10,8 +10,6 @@ import numpy as np
 from ..core import array_dataclass
 from .drive_sizes import DriveKeys, count_beat_cycles
 from .drives import RecordedDrive
-
-TONE_ROWS_PER_PERIOD = 64  # number of rows of the record per period of the highest tone
 
 
 @array_dataclass
@@ -53,7 +51,7 @@ def make_tones(frequencies, accelerations, phases, duration: float) -> TonesReco
     TonesRecord
     """
     max_frequency = max(frequencies)
-    step = 1 / (TONE_ROWS_PER_PERIOD * max_frequency)
+    step = 1 / (64 * max_frequency)
     time = step * np.arange(int(np.ceil(duration / step)) + 2)
     value = sum(
         a / np.sinc(f * step) ** 2 * np.sin(2 * np.pi * f * time + phi)

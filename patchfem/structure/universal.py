@@ -11,7 +11,6 @@ from ..scene.keys.removed import describe_removed
 from .places import DIRECTION_NAMES, MeasuredModes
 
 NORMAL_MODE_TYPE = 2  # analysis type of a real mode in dataset 55
-COMPLEX_MODE_TYPES = (3, 7)  # analysis types of a complex mode in dataset 55
 
 
 class _ModalNumbers(NamedTuple):
@@ -51,8 +50,8 @@ def read_universal(path: Path) -> MeasuredModes:
     modes = [
         dataset
         for dataset in datasets
-        if dataset["type"] == 55
-        and dataset["analysis_type"] in (NORMAL_MODE_TYPE, *COMPLEX_MODE_TYPES)
+        # Real and complex modes
+        if dataset["type"] == 55 and dataset["analysis_type"] in (NORMAL_MODE_TYPE, 3, 7)
     ]
     if not modes:
         types = ", ".join(sorted({str(dataset["type"]) for dataset in datasets}))

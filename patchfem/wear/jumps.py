@@ -2,20 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import array_dataclass, max_abs
 from .depth import Press, solve_jump, wear_rates
 
-MAX_JUMP_GROWTH = 4.0  # largest ratio of the length of a jump to that of the previous jump
 JUMP_SAFETY_FACTOR = 0.9  # safety factor on the length of a jump that would just meet the tolerance
-FIRST_JUMP_FRACTION = 1e-3  # length of the first automatic jump as a fraction of all cycles
 JUMP_ORDER = 2  # order of the method of `depth.solve_jump`
 # Ratio of the difference between a jump and its two halves to the error of the halves
 RICHARDSON_DIVISOR = 2**JUMP_ORDER - 1
-# Smallest ratio of error to tolerance from which the length of the next jump is computed
-MIN_ERROR_RATIO = 1e-9
 # Smallest depth [m] in a divisor; it keeps quotients finite before anything is worn
 MIN_WORN_DEPTH = 1e-300
 
@@ -38,6 +35,13 @@ class WearProblem:
     cycles: float
 
 
+class LastJump(NamedTuple):
+    """Slip path (m,) [m] per cycle in the last jump, and its change (m,) [m] per cycle over this jump."""
+
+    path: np.ndarray
+    trend: np.ndarray
+
+
 @array_dataclass
 class WearState:
     """State of a wear computation after a number of cycles.
@@ -45,22 +49,20 @@ class WearState:
     - cycle: number of cycles since the start
     - depth, force: worn depth (m,) [m] and contact forces (m,) [N]
     - path: slip path (m,) [m] of the next cycle
-    - trend: change (m,) [m] of the slip path per cycle over the last jump
     - length: length of the next automatic jump in cycles
     - coarse_depth: worn depth (m,) [m] of the same jumps without halving
     - path_error: sum over the jumps [m] of the error that the change of the slip path within a jump causes
-    - jump_path: slip path (m,) [m] per cycle of the last jump
+    - jump: slip path of the last jump
     """
 
     cycle: float
     depth: np.ndarray
     force: np.ndarray
     path: np.ndarray
-    trend: np.ndarray
     length: float
     coarse_depth: np.ndarray
     path_error: float
-    jump_path: np.ndarray
+    jump: LastJump
 
     @property
     def error(self) -> float:
@@ -92,11 +94,10 @@ def make_initial_wear_state(problem: WearProblem, depth=None) -> WearState:
         depth=depth,
         force=problem.press(depth, zero),
         path=problem.path(depth),
-        trend=zero,
-        length=FIRST_JUMP_FRACTION * problem.cycles,
+        length=1e-3 * problem.cycles,  # of the first automatic jump
         coarse_depth=depth,
         path_error=0.0,
-        jump_path=zero,
+        jump=LastJump(zero, zero),
     )
 
 
@@ -141,7 +142,7 @@ def take_jump(
 
     # A jump whose error exceeds the tolerance is shortened and repeated
     while True:
-        path = np.maximum(state.path + 0.5 * length * state.trend, 0.0)
+        path = np.maximum(state.path + 0.5 * length * state.jump.trend, 0.0)
         after, error = _take_halves(problem, state, path, length, tolerance)
         # Smallest length of a jump as a fraction of all cycles
         is_forced = count or length <= 1e-9 * problem.cycles
@@ -153,9 +154,7 @@ def take_jump(
         length *= max(0.2, JUMP_SAFETY_FACTOR * error ** (-1 / (JUMP_ORDER + 1)))
 
     # The error of a method of order p falls with the power p + 1 of the length
-    growth = min(
-        MAX_JUMP_GROWTH, JUMP_SAFETY_FACTOR * max(error, MIN_ERROR_RATIO) ** (-1 / (JUMP_ORDER + 1))
-    )
+    growth = min(4.0, JUMP_SAFETY_FACTOR * max(error, 1e-9) ** (-1 / (JUMP_ORDER + 1)))
     cycle = end if length == remaining else after.cycle
     return replace(after, cycle=cycle, length=length * growth)
 
@@ -205,7 +204,7 @@ def _correct_path(
     corrected = replace(
         repeated,
         path=path,
-        trend=(path - state.path) / length,
+        jump=repeated.jump._replace(trend=(path - state.path) / length),
         path_error=state.path_error + path_error,
     )
     return corrected, max(error, path_error / max(tolerance * scale, MIN_WORN_DEPTH))
@@ -242,7 +241,7 @@ def _take_halves(
         depth=depth,
         force=force,
         coarse_depth=coarse_depth,
-        jump_path=path,
+        jump=state.jump._replace(path=path),
     )
 
     # Richardson's estimate of the error of the halves, relative to the tolerance

@@ -20,13 +20,10 @@ from ..surface.quantity import CONFIDENCE_LEVEL, HALF_WIDTH_95, Quantity
 
 # Number of bins along the patch, in which the noise of single heights averages out
 N_PATCH_BINS = 100
-N_TRIAL_COEFFICIENTS = 90  # number of trial coefficients in the search
 # Largest number of positions that are refined in addition to the best one
 MAX_REFINED_POSITIONS = 24
 # Smallest fraction of the patch on the traces for which its position is known
 MIN_PATCH_OVERLAP = 0.25
-# Largest relative coefficient of the search, so that a message can propose one
-MAX_SEARCHED_COEFFICIENT_RATIO = 1e4
 MAX_WIDTH_RATIO = 1.5  # largest ratio of the widths of measured and computed wear
 # Depth at the ends of the computed wear relative to its largest depth
 WORN_END_DEPTH_FRACTION = 0.05
@@ -312,9 +309,8 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
     size = bins.depth.size
     squares = np.full((2, size + N_PATCH_BINS - 1), np.inf)
     ratios = np.ones(squares.shape)
-    for ratio in np.geomspace(
-        history.work[1], MAX_SEARCHED_COEFFICIENT_RATIO, N_TRIAL_COEFFICIENTS
-    ):
+    # Relative coefficients up to 1e4, so that a message can propose one
+    for ratio in np.geomspace(history.work[1], 1e4, 90):
         for side in (0, 1):
             template = history.average(edges, Place(ratio, 0.0, bool(side)))
             # Sum of (d - t)^2 at each shift, for measured depths d and computed depths t, without the constant of d^2.

@@ -18,11 +18,6 @@ import numpy as np
 from ..core import NotConverged, max_abs
 from .depth import Press
 
-# Largest number of Newton steps for the depth at the end of a stage; a step passes many heights, and few remain after ten
-MAX_NEWTON_STEPS = 60
-# Change of the worn depth in a Newton step, relative to the largest depth, at which it has converged
-WORN_DEPTH_TOL = 1e-11
-
 
 class RoughLayer(NamedTuple):
     """Rough layer whose tops wear.
@@ -118,13 +113,14 @@ def make_rough_press(press: Press, layer: RoughLayer) -> Press:
         if not np.any(softening):
             return press(layer.measure_opening(worn), softening)
         end = worn
-        for _ in range(MAX_NEWTON_STEPS):
+        # A Newton step passes many heights, and few remain after ten
+        for _ in range(60):
             slope = layer.measure_slope(end)
             opening = layer.measure_opening(end) - slope * (end - worn)
             force = press(opening, slope * softening)
             before = end
             end = worn + softening * force
-            if max_abs(end - before) <= WORN_DEPTH_TOL * max_abs(end):
+            if max_abs(end - before) <= 1e-11 * max_abs(end):
                 return force
         raise NotConverged(
             "wear: the depth of the rough layer was not found; leave out contact.asperities.hardness, or set wear.jumps"

@@ -106,11 +106,9 @@ def growing(amplitude: float, print_steps: int) -> list:
 
 def slow_path(amplitude: float) -> list:
     """Return rows of LuGre against the stretch law if the bond length follows over a path of l_k = eps_0, at equal v_c."""
-    slow = GROWTH | {
-        "slip_growth": 20 * GROWTH["slip_growth"],
-        "rest_growth": GROWTH["rest_growth"] / 20,
-    }
-    stretch = last_cycle(points(bonds(**slow)), amplitude)
+    growth = GROWTH["growth"]
+    slow = growth._replace(rest_growth=growth.rest_growth / 20, slip_growth=20 * growth.slip_growth)
+    stretch = last_cycle(points(bonds(ratio=RATIO, growth=slow)), amplitude)
     lugre = last_cycle(points(at_once()), amplitude)
     return _rows("on, l_k = eps_0", amplitude, [("LuGre", lugre, stretch)], stretch)
 

@@ -12,7 +12,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import today
 
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
 from patchfem.time_steps.contacts import BondSum, Contact, PointSet
 from patchfem.time_steps.laws import make_bonds, make_cells, make_list
@@ -21,7 +21,7 @@ from patchfem.time_steps.slides import follow
 HERTZ = 143.0  # [Hz] frequency of the loops
 LENGTH = 2e-6  # [m] bond length
 RATIO = 0.7  # kinetic friction / static friction
-GROWTH = {"ratio": RATIO, "rest_growth": 10.0, "slip_growth": 0.05 * LENGTH, "rest_speed": 1e-4}
+GROWTH = {"ratio": RATIO, "growth": BondGrowth(10.0, 0.05 * LENGTH, 1e-4)}
 AMPLITUDES = (0.1, 0.3, 1.0, 3.0, 12.5, 50.0)  # amplitudes of the loops in bond lengths
 STEPS = 4800  # steps per cycle
 AT_ONCE = 1e4  # factor on both rates of 2.10 that leaves only its steady state
@@ -70,11 +70,11 @@ def points(law: Bonds) -> Contact:
 
 def at_once() -> Bonds:
     """Return the law whose bond length is always the steady one at the present speed: LuGre, z' = v - |v| z/eps_eq(v)."""
-    fast = GROWTH | {
-        "rest_growth": AT_ONCE * GROWTH["rest_growth"],
-        "slip_growth": GROWTH["slip_growth"] / AT_ONCE,
-    }
-    return bonds(**fast)
+    growth = GROWTH["growth"]
+    fast = growth._replace(
+        rest_growth=AT_ONCE * growth.rest_growth, slip_growth=growth.slip_growth / AT_ONCE
+    )
+    return bonds(ratio=RATIO, growth=fast)
 
 
 def printed_law_cycle(amplitude: float, order: float, steps: int, **growth) -> Cycle:

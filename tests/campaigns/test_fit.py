@@ -284,7 +284,7 @@ def test_always_unconverged_fit_exits_with_code_3(fit_command, monkeypatch, tmp_
     """A fit that reaches its limit of evaluations exits with code 3 and states that it did not converge."""
     from patchfem.identify import descent
 
-    monkeypatch.setattr(descent, "MAX_EVALUATIONS", 1)
+    monkeypatch.setattr(descent, "MAX_DESCENT_EVALUATIONS", 1)
     assert (
         run_cli(
             *fit_command, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"

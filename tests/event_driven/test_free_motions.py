@@ -24,7 +24,7 @@ from patchfem.event_driven.laws import LAW_OF_NAME, make_law, masing, mirror_sta
 from patchfem.event_driven.laws.springs import make_cubic
 from patchfem.event_driven.periodic import copy_state
 from patchfem.event_driven.records import LawNumbers
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
@@ -390,7 +390,7 @@ RECORDS = {
     "iwan": Iwan(0.3, 40.0, -0.4, 0.5),
     "bouc-wen": BoucWen(0.3, 0.01, 1.5, 0.7),
     "lugre": LuGre(0.3, 0.2, 30.0, 4.0, 0.01, 0.02),
-    "nonlocal": Bonds(0.3, 0.01, rest_growth=1.0, slip_growth=0.01, rest_speed=1e-3),
+    "nonlocal": Bonds(0.3, 0.01, growth=BondGrowth(1.0, 0.01, 1e-3)),
 }
 
 

@@ -108,7 +108,7 @@ def test_exact_resolved_text_contains_derived_values():
     model = build(loads(POINT + GROWING + TRIANGLE))
     assert (
         loads(model.source.resolved).friction.rest_speed
-        == model.bonds.rest_speed
+        == model.bonds.growth.rest_speed
         == 1e-3 * model.speed_scale
     )
 
@@ -121,8 +121,10 @@ def test_exact_sliding_speed_of_a_rig_is_that_of_its_interface():
     assert rig.slide_speed_scale == pytest.approx(2 * np.pi * 5e-3, rel=1e-5)
     bonds = build(loads(POINT + GROWING + STRUCTURE))
     partial = build(loads(POINT + GROWING + STRUCTURE, sets=["structure.mode.axial.slide=0.8"]))
-    assert bonds.bonds.rest_speed == 1e-3 * bonds.rig.speed_scale
-    assert partial.bonds.rest_speed == pytest.approx(0.64 * bonds.bonds.rest_speed, rel=1e-12)
+    assert bonds.bonds.growth.rest_speed == 1e-3 * bonds.rig.speed_scale
+    assert partial.bonds.growth.rest_speed == pytest.approx(
+        0.64 * bonds.bonds.growth.rest_speed, rel=1e-12
+    )
 
 
 def test_exact_layers_in_series_add_their_compliance():

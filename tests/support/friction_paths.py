@@ -118,7 +118,8 @@ def march_under_loads(law, path, loads, dt=1.0, tail=None) -> PathHistory:
 
 def bond_length_rates(law, speed):
     """Return the growth rates of the bond length at rest and in slip (2.10) at a constant speed [1/s]."""
-    return law.rest_growth / max(abs(speed), law.rest_speed), abs(speed) / law.slip_growth
+    growth = law.growth
+    return growth.rest_growth / max(abs(speed), growth.rest_speed), abs(speed) / growth.slip_growth
 
 
 def reference_bond_lengths(law, path, times):

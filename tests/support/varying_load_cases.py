@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from patchfem.contact import ContactSets
 from patchfem.core import InitialState, ModalBasis, SineDrive
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.motion_measures import energy_balance
 from patchfem.time_steps.contacts import Press
 from patchfem.time_steps.time_march import march
@@ -24,7 +24,7 @@ LAWS = {
     "tanh": SimpleNamespace(law="tanh", static=0.3, kinetic=None, reference_speed=1e-3),
     "plastic": SimpleNamespace(law="elastic-plastic", static=0.3, bond_length=1e-6),
     "bonds": Bonds(0.3, 1e-6),
-    "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5),
+    "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, BondGrowth(10.0, 2e-7, 1e-5), 0.5),
 }
 
 

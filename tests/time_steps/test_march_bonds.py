@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.special import gammainc
 
 from patchfem.core import SineDrive
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.motion_measures import energy_balance
 from patchfem.time_steps.contacts import BondSum
 from patchfem.time_steps.time_march import march
@@ -20,7 +20,7 @@ from patchfem.time_steps.time_march import march
 ROW = np.ones(1)
 FORCE = np.array([0.7, 1.3, 2.0, 0.4]) / 0.4  # normal forces of four points [N]
 LAWS = [(reading, order) for reading in ("report", "stretch") for order in (0.0, 0.5, 1.0, 2.0)]
-GROWTH = {"ratio": 0.7, "rest_growth": 0.05, "slip_growth": 3e-7, "rest_speed": 1e-4}
+GROWTH = {"ratio": 0.7, "growth": BondGrowth(0.05, 3e-7, 1e-4)}
 
 
 def make_lists(law, force, shear=None, reach=25.0, merge=0.02, **options):
@@ -105,7 +105,7 @@ def test_exact_energy_balance_over_reversals(reading, order, growth):
 
 def test_always_sudden_slip_dissipates_energy():
     """A point behind a soft spring whose bonds lose nine tenths of their length slips suddenly, and loses the energy."""
-    law = Bonds(0.4, 1e-6, 1.0, "stretch", 0.1, 1e-3, 1e-7, 1e-6, 1.0)
+    law = Bonds(0.4, 1e-6, 1.0, "stretch", 0.1, BondGrowth(1e-3, 1e-7, 1e-6), 1.0)
     path = np.linspace(0, 6e-6, 301)
     shear = make_shear(np.ones((1, 1)), [2e5])
     found = follow_path(make_lists(law, [5.0], shear, 30.0, 0.01), path, 1e-4)
@@ -125,7 +125,9 @@ def test_steeply_weakening_bonds_follow_the_first_solution(slip_growth, peak, ar
     the first change of sign of the residual; a sudden slip advances by 0.05 bond lengths at a time.
     """
     length = 0.3392e-6
-    law = Bonds(0.721, length, 0.0, "stretch", 0.1517 / 0.721, 0.05, slip_growth, 1e-5, 0.1679)
+    law = Bonds(
+        0.721, length, 0.0, "stretch", 0.1517 / 0.721, BondGrowth(0.05, slip_growth, 1e-5), 0.1679
+    )
     shear = make_shear(np.ones((1, 1)), [3.862e6])
     n_steps = 1024
     path = 12.16e-6 * np.sin(2 * np.pi * np.arange(2 * n_steps + 1) / n_steps)
@@ -142,7 +144,7 @@ def test_steeply_weakening_bonds_follow_the_first_solution(slip_growth, peak, ar
 
 @pytest.mark.parametrize(
     "growth",
-    [{}, {"ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6, "rest_speed": 1e-3}],
+    [{}, {"ratio": 0.7, "growth": BondGrowth(10.0, 0.2e-6, 1e-3)}],
     ids=["constant length", "growing length"],
 )
 def test_order_two_against_integrated_rate_equations(growth):
@@ -198,7 +200,7 @@ def test_order_two_against_integrated_rate_equations(growth):
 
 def test_always_full_list_keeps_forces_near_those_of_long_list(monkeypatch):
     """A list without room joins strips; the force changes by less than a thousandth of its limit, and no step fails."""
-    law = Bonds(0.4, 2e-5, 1.0, "report", 0.6, 10.0, 5e-6, 1e-4)
+    law = Bonds(0.4, 2e-5, 1.0, "report", 0.6, BondGrowth(10.0, 5e-6, 1e-4))
 
     def march_list(room):
         for name in ("N_UNMERGED_STRIPS", "MAX_STRIPS"):

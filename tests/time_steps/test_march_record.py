@@ -14,7 +14,7 @@ from modal_bases import make_modal_basis
 from varying_load_cases import LAWS, MIXED, crowned_contact, make_modes
 
 from patchfem.core import Outcome, SineDrive
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.partial_slip.shear_modes import shear_modes
 from patchfem.structure import drive_sizes
 from patchfem.time_steps import March, laws, march
@@ -115,7 +115,7 @@ def test_exact_beats_and_slow_growth_are_not_repeated(monkeypatch):
     """All steps are computed if an undamped mode beats, or if bonds grow over a time much longer than the run."""
     ones = np.ones(2)
     beating = make_modal_basis(OMEGA * np.array([1.0, 1.37]), [0.05, 0.0], [1.0, 0.0], ones, ones)
-    growing = Bonds(0.4, 1e-6, ratio=2.0, rest_growth=1e-12, slip_growth=1e3)
+    growing = Bonds(0.4, 1e-6, ratio=2.0, growth=BondGrowth(1e-12, 1e3))
     steps = count_steps(monkeypatch)
     march(beating, DRIVE, make_tanh_contact(beating.interfaces), CYCLES, STEPS, window=5)
     march(BASIS, DRIVE, make_bond_contact(growing, 50.0, ROW), CYCLES, STEPS, window=5)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from march_contacts import make_bond_contact
 
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.time_steps import slides
 
 TIME = np.linspace(0.0, 0.4, 161)
 SLIDE = 3e-6 * np.sin(2 * np.pi * 10 * TIME) + 1e-6 * np.sin(2 * np.pi * 25 * TIME)
-GROWING = Bonds(0.3, 1e-6, ratio=0.6, rest_growth=1e-5, slip_growth=2e-6, rest_speed=1e-6)
+GROWING = Bonds(0.3, 1e-6, ratio=0.6, growth=BondGrowth(1e-5, 2e-6, 1e-6))
 
 
 @pytest.mark.parametrize("bonds", [Bonds(0.3, 1e-6), GROWING])

@@ -122,9 +122,7 @@ def from_law(law, load):
             "friction.reading",
         )
     length = law.length
-    growth = (0.0, 1.0, 1.0)
-    if law.has_growth:
-        growth = (law.rest_growth, law.slip_growth, law.rest_speed)
+    growth = law.growth or (0.0, 1.0, 1.0)
     numbers = (law.static, length, law.ratio * length, *growth)
     scales = (DENSITY_SCALE, 1e-2 * length, 1e-4 * length**2, length)
     return LawNumbers("bonds", numbers, (law.initial, 0.0, 0.0, length), scales)

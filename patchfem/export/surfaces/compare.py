@@ -174,7 +174,7 @@ def _make_data(comparison: Comparison) -> Variables:
     curves = comparison.evidence.curves
     if curves is None:
         return _make_separate(comparison)
-    heights = (curves.before, curves.after)
+    heights = curves.heights
     if comparison.is_areal:
         data = make_maps(
             curves.x, curves.y, before_map=heights[0], after_map=heights[1], depth_map=curves.depth
@@ -182,7 +182,7 @@ def _make_data(comparison: Comparison) -> Variables:
     else:
         data = make_variables("surface", x=curves.x, before=heights[0], after=heights[1])
         data |= make_band("depth", curves.depth, HALF_WIDTH_95 * curves.noise)
-        state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3))
+        state = np.select((curves.masks.unworn, curves.masks.worn, curves.masks.grown), (1, 2, 3))
         data |= make_variables("surface", state=state)
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)
 

@@ -12,7 +12,7 @@ from .strip_sum_kernels import GAUSS, Moved, find_ages, mix
 
 CONTIGUOUS_TOL = 1e-9  # round-off of the ends of two strips that formed one after the other, relative to their length
 MAX_YOUNG_RANGE = 0.25  # largest range of ages of growing bonds relative to the youngest one, for an order below 0
-MIN_LOAD = 1e-300  # smallest load [N] by which a weight is divided
+MIN_DIVISOR_LOAD = 1e-300  # smallest load [N] by which a weight is divided
 MIN_MISFIT_AGE = 1e-12  # smallest age [bond lengths] at which the strength of bonds of a fractional order is compared
 
 
@@ -67,7 +67,7 @@ def join_strips(strips, state, law, error):
     last = -1
     still = Moved(0.0, 0.0, 1.0, state[ListState.LENGTH])
     per_load = law[ListLaw.LENGTH] ** (law[ListLaw.ORDER] * law[ListLaw.IS_STRETCH])
-    per_load /= max(state[ListState.LOAD], MIN_LOAD)
+    per_load /= max(state[ListState.LOAD], MIN_DIVISOR_LOAD)
     older = read_strip(strips, 0)
     for k in range(int(state[ListState.COUNT])):
         strip = drop_old_bonds(read_strip(strips, k), law[ListLaw.CUTOFF])

@@ -29,7 +29,7 @@ from .strip_sum_kernels import (
     slide_signs,
 )
 
-MIN_PATH = 1e-300  # path [m] below which a point rests
+MIN_SLIP_PATH = 1e-300  # path [m] below which a point rests
 # Largest growth J along a new strip: in more of it nearly all bonds are mature
 MAX_STRIP_GROWTH = 0.25
 # Largest changes of the age, and of the damage where powers of stretches act, and largest growth, along a part of an
@@ -37,7 +37,7 @@ MAX_STRIP_GROWTH = 0.25
 MAX_PART_AGE = 2.0
 MAX_PART_DAMAGE = 0.6
 MAX_PART_GROWTH = 3.0
-MAX_PARTS = 128
+MAX_GAUSS_PARTS = 128
 OUTER_GAUSS = sqrt(0.6)  # place of the outer points in half lengths of a part
 MATURE_CHANGE = 2e-4  # relative change of the length of bonds that is as good as linear in the path
 # Parts at the end of an increment that are shorter than this fraction of the others are left out
@@ -141,7 +141,7 @@ def find_new_strips(state, law, increment):
     increment : Increment
         Part of a slide.
     """
-    if abs(increment.slide) < MIN_PATH or state[ListState.LOAD] <= 0:
+    if abs(increment.slide) < MIN_SLIP_PATH or state[ListState.LOAD] <= 0:
         return 0.0
     if increment.growth == 0 or law[ListLaw.IS_STRETCH] > 0:
         return 1.0
@@ -375,10 +375,10 @@ def average_pull(strip, law, increment, low, high):
     n = change / (MAX_PART_DAMAGE if law[ListLaw.IS_STRETCH] > 0 else MAX_PART_AGE)
     if law[ListLaw.ORDER] < 0:
         youngest = min(min(before.first, before.last), min(after.first, after.last))
-        n = max(n, change / max(youngest, MIN_PATH))
+        n = max(n, change / max(youngest, MIN_SLIP_PATH))
     if law[ListLaw.IS_STRETCH] == 0:
         n = max(n, increment.growth * (high - low) / MAX_PART_GROWTH)
-    n = min(max(n, 1.0), MAX_PARTS)
+    n = min(max(n, 1.0), MAX_GAUSS_PARTS)
     mean = 0.0
     begin = 0.0
     for i in range(count_parts(n)):
@@ -497,7 +497,7 @@ def advance_list(bonds, slide, v_0, v_1, dt):
     strips = bonds.strips
     state = bonds.state
     law = bonds.law
-    slide = slide if abs(slide) >= MIN_PATH else 0.0
+    slide = slide if abs(slide) >= MIN_SLIP_PATH else 0.0
     increment = make_increment(state, bonds.growth, slide, v_0, v_1, dt)
     moved = move(increment, 1.0)
     older = moved.damage if law[ListLaw.IS_STRETCH] > 0 else moved.path

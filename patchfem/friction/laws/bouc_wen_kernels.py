@@ -11,7 +11,7 @@ from ...kernel_cache.flags_kernels import NJIT_CALL, NJIT_KERNEL
 from ...kernel_cache.jit import njit
 
 NEARLY_SATURATED = 1e-3  # distance of y from 1 below which any exponent has a closed form
-SATURATED = 1e-14  # distance of |y| from 1 that is round-off
+SATURATED_DISTANCE = 1e-14  # distance of |y| from 1 that is round-off
 SMALL_RATIO = 1e-4  # x below which a series replaces ln(1 + x)/x
 TINY_FORCE = 1e-8  # y below which |y|^n is constant over a path of twice its size
 # Longest path in lengths of a Taylor step, for an exponent and a rate dy/dx of 1, and its largest change of y relative to y
@@ -58,7 +58,7 @@ def _saturate(distance, power, path):
     is e at the start, which is not negative, `power` the exponent n, and `path` is x in lengths eps.
     """
     bend = 0.5 * (power - 1)
-    if distance < SATURATED:
+    if distance < SATURATED_DISTANCE:
         return FollowedPath(1.0, 1.0, 0.0)
     decay = exp(-power * path)
     end = distance * decay / (1 - bend * distance * (1 - decay))

@@ -21,8 +21,6 @@ from .coulomb import Coulomb
 # Number of positions that are averaged at a time; nodes beyond the cut-off of the whole block are
 # left out
 N_POSITIONS_PER_BLOCK = 64
-# Largest weight of a node beyond the cut-off in an average; it is below round-off
-CUTOFF_WEIGHT = 1e-20
 
 
 def from_keys(friction, load: float) -> Coulomb:
@@ -121,15 +119,15 @@ def average_pressure(
     Returns
     -------
     (n,) array
-        Average [Pa], exact but for nodes so far behind that their weight is below CUTOFF_WEIGHT.
+        Average [Pa], exact but for nodes so far behind that their weight is below 1e-20.
     """
     positions, nodes, sigma = (np.asarray(part, float) for part in (positions, nodes, sigma))
     if direction < 0:
         return average_pressure(-positions, -nodes[::-1], sigma[::-1], 1.0, length, order)
     is_bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
-    # Nodes farther away than `cutoff` have weights below CUTOFF_WEIGHT. A pressure that is linear between two nodes
-    # multiplies phi by a power of s, so that the incomplete gamma function of order p + 2 bounds these weights.
-    cutoff = length * float(gammainccinv(order + 2, CUTOFF_WEIGHT))
+    # Nodes farther away than `cutoff` have weights below round-off. A pressure that is linear between two nodes multiplies
+    # phi by a power of s, so that the incomplete gamma function of order p + 2 bounds these weights.
+    cutoff = length * float(gammainccinv(order + 2, 1e-20))
 
     # Blocks of positions bound the memory; nodes whose weight is below round-off are left out
     averages = np.zeros(positions.size)

@@ -340,12 +340,12 @@ def find_steepest_fall(law) -> float:
     """
     if not law.has_growth:
         return 0.0
-    scales = (law.length, law.slip_growth)
+    scales = (law.length, law.growth.slip_growth)
     first = FALL_RANGE[0] * min(scales)
     slide = np.append(0.0, np.geomspace(first, FALL_RANGE[1] * max(scales), N_FALL_SAMPLES))
 
     # A step of duration t grows the bonds by a_s t^2/h over its slide h, relative to their whole growth.
-    growth = max(law.rest_growth, np.finfo(float).tiny) * np.sum(1 / np.diff(slide))
+    growth = max(law.growth.rest_growth, np.finfo(float).tiny) * np.sum(1 / np.diff(slide))
     time = np.sqrt(MAX_FALL_GROWTH / growth) * np.arange(slide.size)
     point = PointSet(laws.make_bonds(law, 1.0), np.zeros(0))
     if law.order != 1 or law.reading != "stretch":

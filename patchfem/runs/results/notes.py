@@ -50,7 +50,7 @@ def _warn_of_slow_forming(run) -> Iterator[str]:
     if ratio > MAX_BOND_FORMING_SLIP_RATIO:
         # At this growth path, growth_path_ratio(law, speed) equals MAX_BOND_FORMING_SLIP_RATIO.
         max_growth_path = law.ratio / (
-            1 / (MAX_BOND_FORMING_SLIP_RATIO * law.length) - law.rest_growth / speed**2
+            1 / (MAX_BOND_FORMING_SLIP_RATIO * law.length) - law.growth.rest_growth / speed**2
         )
         yield (
             f"at the peak speed of {speed:.3g} m/s a bond slides by {ratio:.2g} of its length while it forms (limit "

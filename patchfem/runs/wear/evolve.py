@@ -20,7 +20,14 @@ from ...model.wear import interpolate_nodes
 from ...time_steps.checkpoint import RETRY_ADVICE, read_state, write_state
 from ...wear import rough_layer
 from ...wear.depth import Press, wear_rates
-from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
+from ...wear.jumps import (
+    LastJump,
+    WearProblem,
+    WearState,
+    make_initial_wear_state,
+    replay_jumps,
+    take_jump,
+)
 from ..patch import area
 from ..patch.measures import with_static_measures
 from ..patch.press import (
@@ -225,7 +232,7 @@ class _Wear:
             if worn.friction.bond_length is not None:
                 values["bond_length"] = worn.friction.bond_length
         pressed = patch.pressure
-        fields = (state.depth, state.jump_path, pressed.sigma_n, pressed.gap)
+        fields = (state.depth, state.jump.path, pressed.sigma_n, pressed.gap)
         return WearMoment(state.cycle, *fields, self.last.error, values)
 
     def replay(self, mesh, moments) -> tuple[Patch, np.ndarray]:
@@ -517,9 +524,9 @@ def load_wear_state(path: Path, key: str) -> History:
     """
     if not path.is_file():
         raise make_missing_state_error(path)
-    fields, rows = read_state(path, key)
+    (*fields, jump), rows = read_state(path, key)
     moments = (WearMoment(*fields_of_moment, dict(values)) for *fields_of_moment, values in rows)
-    return WearState(*fields), tuple(moments)
+    return WearState(*fields, LastJump(*jump)), tuple(moments)
 
 
 def make_missing_state_error(path: Path) -> PatchfemError:

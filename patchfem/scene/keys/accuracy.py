@@ -4,11 +4,6 @@ from typing import Literal
 
 from .types import Fraction, Table, key, number, optional, quantity, whole_number
 
-# Largest number of time steps per cycle; more would take days for a single cycle.
-MAX_STEPS_PER_CYCLE = 10_000_000
-# Largest number of shear modes; more make the dense matrices too large.
-MAX_SHEAR_MODES = 10_000
-
 
 class Accuracy(Table):
     """Tolerance and numerical settings. A setting that is not given follows from the tolerance."""
@@ -32,7 +27,8 @@ class Accuracy(Table):
         "method that computes the motion; default: the program chooses a method for the scene",
     ) = "auto"
     steps_per_cycle: optional(
-        whole_number(4, MAX_STEPS_PER_CYCLE),
+        # More would take days for a single cycle
+        whole_number(4, 10_000_000),
         "time steps per cycle; default: set by the tolerance",
     )
     quadrature: key(
@@ -48,6 +44,7 @@ class Accuracy(Table):
         "width, in bond lengths, within which bonds are merged; default: set by the tolerance",
     )
     shear_modes: optional(
-        whole_number(1, MAX_SHEAR_MODES),
+        # More make the dense matrices too large
+        whole_number(1, 10_000),
         "number of shear modes of the pieces; default: set by the tolerance",
     )

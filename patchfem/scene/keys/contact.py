@@ -31,7 +31,6 @@ from .values import TomlValue
 
 Piece = Literal["upper", "lower"]
 LengthUnit = Literal[tuple(UNIT_FACTORS["length"])]
-MAX_EQUAL_PATCHES = 1_000_000  # largest number of equal patches, far more than any joint has
 # Smallest and largest number of cells along the longer side of an area; the grids of the error estimate have a half and a
 # quarter of them, and more cells than 1024 take minutes.
 MIN_AREA_CELLS = 32
@@ -356,7 +355,8 @@ class Contact(Table):
         "total normal force on the interface, weight included; [contact.approach] may be given in place of this key",
     )
     pairs: key(
-        whole_number(1, MAX_EQUAL_PATCHES),
+        # Far more than any joint has
+        whole_number(1, 1_000_000),
         "number of equal patches that share the load; forces and stiffnesses are reported "
         "for all these patches together",
     ) = 1

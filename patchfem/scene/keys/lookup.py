@@ -18,8 +18,6 @@ from .types import Key, KeyType, KeyValue, Table, advise_on_name, list_keys
 from .values import TomlTable, TomlValue
 
 MAX_SHOWN_CHARACTERS = 60  # largest number of characters of a wrong value in a message
-# Beginnings of requirements that do not tell what a key is.
-_UNSPECIFIC_REQUIREMENTS = ("a plain", "a whole", "a text", "plain", "whole", "two whole")
 
 
 class KeyLimit(NamedTuple):
@@ -160,7 +158,10 @@ def describe_missing_key(key: Key | None, path: str) -> str:
     if key is not None and key.is_array and key.inner is not None:
         return ""
     needed = describe_requirement(key, path)
-    if not (needed.startswith(_UNSPECIFIC_REQUIREMENTS) and key.record.meaning):
+    if not (
+        needed.startswith(("a plain", "a whole", "a text", "plain", "whole", "two whole"))
+        and key.record.meaning
+    ):
         return needed
     return f"{needed} ({re.split('[;:] ', key.record.meaning)[0]})"
 

@@ -24,9 +24,7 @@ EXAMPLE_QUANTITIES: dict[str, str] = {kind: row["example"] for kind, row in _KIN
 NUMBER_PATTERN = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY_PATTERN = re.compile(rf"({NUMBER_PATTERN})[ \t]+(\S.*)")
 PERCENTAGE_PATTERN = rf"\s*({NUMBER_PATTERN})[ \t]*%\s*"
-_BARE_NUMBER_PATTERN = re.compile(NUMBER_PATTERN)
 _JOINED_UNIT_PATTERN = re.compile(rf"({NUMBER_PATTERN})([^\s0-9.,#+±-].*)")
-_DECIMAL_COMMA_PATTERN = re.compile(r"[+-]?[0-9]+,[0-9]+")
 # Largest length of a quantity; a longer string is refused without being parsed.
 _MAX_CHARACTERS = 100
 _MAX_SHOWN_CHARACTERS = 60  # largest length of a wrong quantity in a message
@@ -161,11 +159,11 @@ def _describe_malformed_text(words: str, kind: str) -> str:
 
     # The first cause that fits is named.
     glued = _JOINED_UNIT_PATTERN.fullmatch(words)
-    if _BARE_NUMBER_PATTERN.fullmatch(words):
+    if re.fullmatch(NUMBER_PATTERN, words):
         reason = f"'{displayed_text}' is a bare number without a unit"
     elif any(sign in words for sign in ("±", "+/-", "+-")):
         reason = f"'{displayed_text}' has a tolerance: give only the nominal value"
-    elif _DECIMAL_COMMA_PATTERN.match(words):
+    elif re.match(r"[+-]?[0-9]+,[0-9]+", words):
         reason = f"'{displayed_text}' has a comma: use a point as the decimal separator"
     elif "#" in words:
         reason = f"'{displayed_text}': '#' is ambiguous, write the name of the unit ({_list_units(kind)})"

@@ -46,7 +46,6 @@ from .values import TomlValue
 LawName = Literal[tuple(LAWS)]
 WaveName = Literal[tuple(WAVEFORMS)]
 MAX_MASS_NUMBER = 1_000_000  # largest number of a mass in a key
-MAX_MATRIX_ROW_NUMBER = 2_000_000  # largest row of a matrix in a key
 # File name extensions of universal files, by which every reader knows them
 UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
 
@@ -322,7 +321,7 @@ class Interface(Friction):
         return key.replace("contact", "structure.interface.contact", 1)
 
 
-Coordinate = whole_number(1, MAX_MATRIX_ROW_NUMBER) | Text
+Coordinate = whole_number(1, 2_000_000) | Text  # row of a matrix, or its name
 
 
 class Reduced(Table):

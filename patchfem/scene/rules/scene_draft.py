@@ -16,11 +16,8 @@ from .view import TableView
 
 # Sort order of mistakes in --set, which are listed after those of all lines of a file.
 SET_MISTAKE_ORDER = 10**9
-# Length in characters above which a message cuts a word; keys, units and file names are shorter.
-MAX_WORD_CHARACTERS = 200
-N_SHOWN_CHARACTERS = 60  # number of characters of a cut word that a message shows
-# Pattern of a word that is cut in a message
-_LONG_WORD_PATTERN = re.compile(rf"[^\s/\\:]{{{MAX_WORD_CHARACTERS},}}")
+# Pattern of a word that is cut in a message; keys, units and file names are shorter
+_LONG_WORD_PATTERN = re.compile(r"[^\s/\\:]{200,}")
 
 
 class SceneError(PatchfemError):
@@ -168,7 +165,7 @@ class SceneDraft:
 
         Long words and control characters are cut. `order` sorts the mistakes: a line number, or 0 for the whole file.
         """
-        text = _LONG_WORD_PATTERN.sub(lambda word: f"{word[0][:N_SHOWN_CHARACTERS]}...", text)
+        text = _LONG_WORD_PATTERN.sub(lambda word: f"{word[0][:60]}...", text)
         printable = "".join(sign if sign.isprintable() else " " for sign in text)
         self._mistakes.setdefault((order, f"{location}: {printable}"))
 

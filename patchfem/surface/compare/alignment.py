@@ -19,19 +19,12 @@ from .statistics import (
     subtract_local_level,
 )
 
-# Largest number of points to which the place is fitted. More would hardly improve it.
-MAX_FIT_POINTS = 40_000
-TRIED_DATUM_TERM_COUNTS = {1: (2, 3), 2: (3,)}  # numbers of terms of the datums that are tried
 # Significance of the correlation at a place above which the place is sure without other evidence
 SURE_SIGNIFICANCE = 12.0
-# Smallest fraction of heights that agree, relative to that of unrelated surfaces, at a place of low significance
-MIN_AGREEMENT_OVER_CHANCE = 3.0
-# Fraction of heights that must agree in addition to MIN_AGREEMENT_OVER_CHANCE times that of unrelated surfaces
+# Fraction of heights that must agree in addition to three times that of unrelated surfaces, at a place of low significance
 MIN_EXTRA_AGREEMENT = 0.05
 N_CHANCE_PLACES = 15  # number of other places that show how many heights agree by chance
-ROUNDING_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
 CALIBRATED_GAIN_DEVIATION = 0.01  # standard deviation of the gain of two calibrated measurements
-N_GAIN_TILES = {1: 40, 2: 8}  # number of tiles along each side that show the error of the gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +75,8 @@ def align(
     if model.known.sum() < MIN_TRACE_HEIGHTS:
         return _refuse(first, second)
 
-    digit = ROUNDING_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
+    # Standard deviation of a uniform error of one digit
+    digit = 1 / np.sqrt(12) * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
     # Smallest standard deviation of a depth [m]; flat surfaces have none
     digit = max(digit, 1e-15)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
@@ -110,11 +104,12 @@ def _make_model(first: Raster, second: Raster, place: Place, stride: int = 0) ->
     """Return the model of two surfaces at a place, or None if they hardly overlap.
 
     `first` and `second` are the surfaces before and after wear. The model takes each `stride`-th point along every axis,
-    by default as many as MAX_FIT_POINTS allows.
+    by default so many that at most 40 000 are fitted.
     """
     sampled, other = order(first, second.mirror() if place.mirrored else second)
     if not stride:
-        stride = int(np.ceil((sampled.z.size / MAX_FIT_POINTS) ** (1 / sampled.z.ndim)))
+        # More points would hardly improve the place
+        stride = int(np.ceil((sampled.z.size / 40_000) ** (1 / sampled.z.ndim)))
     model = Model(sampled, other, place, stride)
     count = model.known.sum()
     # Smallest part of the sampled surface that both surfaces must show
@@ -171,7 +166,7 @@ def _is_same_place(aligned: Aligned) -> bool:
     # Significance of the correlation at a place that suffices if enough heights agree, too
     if significance > 6.0 and agreeing_fraction - chance_fraction > min_excess:
         return True
-    return agreeing_fraction > MIN_AGREEMENT_OVER_CHANCE * chance_fraction + MIN_EXTRA_AGREEMENT
+    return agreeing_fraction > 3.0 * chance_fraction + MIN_EXTRA_AGREEMENT
 
 
 def _estimate_chance(first, second, noise: float) -> float:
@@ -204,7 +199,8 @@ def _fit_datum(model: Model, state, digit: float, *, is_straight: bool) -> Fit:
         Whether only the datum with the fewest terms is fitted.
     """
     best = None
-    for n_terms in TRIED_DATUM_TERM_COUNTS[model.n_axes]:
+    # Numbers of terms of the datums that are tried
+    for n_terms in {1: (2, 3), 2: (3,)}[model.n_axes]:
         if best is not None and is_straight:
             break
         start = model.find_datum(state, n_terms)
@@ -289,9 +285,9 @@ def _estimate_gain(model: Model, fit: Fit) -> tuple[float, float]:
     # The noise of the first surface, half of that of the depth, is part of its waves too.
     residual = depth - slope * waves
     dilution = float((residual**2).sum() / 2 / power)
-    # Neighbouring heights share errors, tiles hardly do.
+    # Neighbouring heights share errors, tiles (40 of a trace, 8 x 8 of a scan) hardly do.
     influence = waves * residual / power
-    tiles = split_tiles(influence.shape, N_GAIN_TILES[depth.ndim])
+    tiles = split_tiles(influence.shape, {1: 40, 2: 8}[depth.ndim])
     sums = [influence[tile].sum() for tile in tiles]
     return dilution - slope, float(np.hypot(np.linalg.norm(sums), dilution))
 

@@ -18,9 +18,6 @@ WINDOW_SIDES = {1: (1, 4, 16, 64), 2: (1, 3, 9, 25)}
 # Length in samples of the smallest changed part of traces: an error of interpolation at a kink spreads over 7 samples,
 # and one more on each side
 MIN_CHANGED_TRACE_SAMPLES = 9
-# Side in samples of the smallest group of points whose own depths, not means over windows, show a change, by number of
-# axes
-MIN_CHANGED_SPOT_SIDE = {1: 1, 2: 3}
 # Standard deviations to which a single depth counts in a mean over a window, by number of axes
 MAX_DEPTH_DEVIATIONS = {1: 4.0, 2: 8.0}
 # Fraction of the means above or below zero that are unchanged at least.
@@ -71,7 +68,8 @@ def find_changed(depth, noise) -> np.ndarray:
 
         # All points of a window whose mean is too high have changed. Single points of scans count only in groups.
         high = (mean > limit * scatter) & (weight > 0.25)
-        spot = MIN_CHANGED_SPOT_SIDE[depth.ndim]
+        # Side in samples of the smallest group of points whose own depths, not means over windows, show a change
+        spot = {1: 1, 2: 3}[depth.ndim]
         if side == 1:
             changed |= ndimage.binary_opening(high, np.ones((spot,) * depth.ndim))
         else:

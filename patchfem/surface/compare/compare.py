@@ -40,12 +40,6 @@ from .verdict import find_sure_loss, judge_change, measure_sharp_loss
 
 # Number of lines of points at an end of a surface in which growth counts as growth at this end
 N_END_LINES = 7
-# Side in samples of the square by which worn places of scans are enlarged, so that flanks count
-WORN_MARGIN_SIDE = 7
-# Mean height of a bow relative to the short waves, from which on it may be a scar. Instruments have lower ones.
-MIN_BOW_TO_WAVES_RATIO = 1.0
-# Area of a bow relative to the worn area, from which on the verdict depends on whether the bow is a scar
-MIN_BOW_TO_WORN_RATIO = 0.5
 MIN_REPORTED_LENGTH_ERROR = 5e-4  # smallest error of length that is reported
 
 
@@ -243,7 +237,7 @@ def _measure(
     spans = find_spans(depths) if is_trace else []
     covered = _cover_loss(depths, spans)
     area, error = depths.integrate(covered)
-    is_grown = _enlarge(depths.grown) & depths.inside & ~depths.worn
+    is_grown = _enlarge(depths.masks.grown) & depths.masks.inside & ~depths.masks.worn
     grown, grown_error = depths.integrate(is_grown, -1.0)
     is_placed = placement.basis == "place"
     # The flanks of a track were compared with random traces, which choose their deepest place too.
@@ -255,7 +249,7 @@ def _measure(
     lowest = max(area - HALF_WIDTH_95 * error, sharp - HALF_WIDTH_95 * sharp_error, 0.0)
     highest = max(area + HALF_WIDTH_95 * error + depths.measure_hidden(covered), sharp)
     loss = name_quantity(names.lost, largest, lowest, highest)
-    sure_area = depths.integrate(depths.worn)[0]
+    sure_area = depths.integrate(depths.masks.worn)[0]
     code = judge_change(largest, drift, sure_loss, sure_area, grown, grown_error)
     if not is_placed and code != "worn":
         code = "elsewhere"
@@ -363,7 +357,7 @@ def _collect_findings(
     # The noise of the depths contains the drift; that of neighbours does not.
     drift = depths.errors.drift
     short_noise = _measure_short_noise(depths)
-    first, last = depths.x[depths.worn][[0, -1]] if not is_placed else (0.0, 0.0)
+    first, last = depths.x[depths.masks.worn][[0, -1]] if not is_placed else (0.0, 0.0)
     rows = (
         (
             not is_placed and tracks,
@@ -397,12 +391,12 @@ def _is_broken(depths: DepthMap, span: tuple[int, int], fraction: float) -> bool
 
     `span` are the first and the last sample of the track in `depths`.
     """
-    return bool(depths.worn[span[0] : span[1] + 1].mean() < fraction)
+    return bool(depths.masks.worn[span[0] : span[1] + 1].mean() < fraction)
 
 
 def _enlarge(part) -> np.ndarray:
-    """Return a mask, `part`, enlarged on each side by half a square of WORN_MARGIN_SIDE samples."""
-    return ndimage.binary_dilation(part, np.ones((WORN_MARGIN_SIDE,) * part.ndim))
+    """Return a mask, `part`, enlarged on each side by half a square of 7 samples, so that flanks count."""
+    return ndimage.binary_dilation(part, np.ones((7,) * part.ndim))
 
 
 def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
@@ -411,14 +405,14 @@ def _cover_loss(depths: DepthMap, spans: list[tuple[int, int]]) -> np.ndarray:
     `spans` are first and last sample of each track of a trace. Grown heights are left out.
     """
     if depths.depth.ndim > 1:
-        return _enlarge(depths.worn) & depths.inside & ~depths.grown
+        return _enlarge(depths.masks.worn) & depths.masks.inside & ~depths.masks.grown
     covered = np.zeros(depths.depth.size, bool)
     for span in spans:
         margin = get_margin(span)
         covered[max(span[0] - margin, 0) : span[1] + margin + 1] = True
     # New roughness that stands above the first surface is no loss, nor is a spike.
     is_near = np.abs(depths.depth) < 2 * UNWORN_LIMIT_DEVIATIONS * depths.noise
-    return covered & (depths.worn | depths.missing | is_near) & ~depths.grown
+    return covered & (depths.masks.worn | depths.masks.missing | is_near) & ~depths.masks.grown
 
 
 def _doubt(
@@ -455,7 +449,7 @@ def _doubt(
     """
     area, grown, bend = sizes
     if code == "grown" and _has_grown_at_ends(depths):
-        height = grown / (float(depths.grown.sum()) * depths.cell)
+        height = grown / (float(depths.masks.grown.sum()) * depths.cell)
         return "growth_at_ends", {"scar_depth": height, "growth_height": height}
     if depths.depth.ndim > 1:
         return code, {}
@@ -464,10 +458,9 @@ def _doubt(
     is_cut = bool(tracks) and any(tracks[0].cut)
     is_worn = code.startswith("worn")
     bow = 2 / 3 * max(bend, 0.0) * depths.size
-    waves_height = robust_deviation(remove_long_waves(depths.after))
-    is_bow_large = (
-        bow > MIN_BOW_TO_WORN_RATIO * area and bend > MIN_BOW_TO_WAVES_RATIO * waves_height
-    )
+    waves_height = robust_deviation(remove_long_waves(depths.heights[1]))
+    # Whether a bow is a scar matters from half of the worn area on. Bows of instruments are lower than the short waves.
+    is_bow_large = bow > 0.5 * area and bend > waves_height
     has_poor_datum = is_cut or depths.errors.drift > _measure_short_noise(depths)
     if is_bow_large and (code in ("no_wear", "scar_or_drift") or (is_worn and has_poor_datum)):
         return "scar_or_bow", {"scar_depth": (bow + area) / depths.size}
@@ -476,8 +469,7 @@ def _doubt(
     if is_worn and not is_cut:
         # Width of a track relative to the common part, beyond which it may be growth at its ends.
         is_wide = tracks[0].values["width"].value > 0.8 * depths.size
-        # Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops
-        # are worn, it is smaller.
+        # Smallest fraction of worn heights in a track as wide as the whole surface. Where only tops are worn, it is smaller.
         if is_wide and not _is_broken(depths, spans[0], 0.9):
             height = tracks[0].values["depth_mean"].value
             return "growth_at_ends", {"scar_depth": area / depths.size, "growth_height": height}
@@ -510,7 +502,7 @@ def _find_step(depths: DepthMap, *, at_end: bool) -> float:
     """
     depth = depths.depth if at_end else depths.depth[::-1]
     noise = depths.noise if at_end else depths.noise[::-1]
-    is_worn = depths.worn if at_end else depths.worn[::-1]
+    is_worn = depths.masks.worn if at_end else depths.masks.worn[::-1]
     height = float(np.median(depth[is_worn]))
     # The place of least squares: beyond it, each depth is nearer to the height than to 0 on average.
     gain = np.cumsum((depth * height - height**2 / 2)[::-1])
@@ -534,8 +526,8 @@ def _has_grown_at_ends(depths: DepthMap) -> bool:
     axes = set(range(depths.depth.ndim))
     for axis in axes:
         others = tuple(axes - {axis})
-        counts = depths.inside.sum(axis=others)
-        grown = depths.grown.sum(axis=others)[counts > 0] / counts[counts > 0]
+        counts = depths.masks.inside.sum(axis=others)
+        grown = depths.masks.grown.sum(axis=others)[counts > 0] / counts[counts > 0]
         # Fraction of the points of a line near an end above which the end has grown
         if max(grown[:N_END_LINES].max(), grown[-N_END_LINES:].max()) > 0.5:
             return True
@@ -564,8 +556,8 @@ def _measure_share(depths: DepthMap) -> Quantity:
     The half-width of its interval is one line of points around the worn places.
     """
     cell = depths.cell
-    share = float(depths.worn.sum()) * cell / depths.size
-    edge = float(ndimage.binary_dilation(depths.worn).sum()) * cell / depths.size - share
+    share = float(depths.masks.worn.sum()) * cell / depths.size
+    edge = float(ndimage.binary_dilation(depths.masks.worn).sum()) * cell / depths.size - share
     return name_quantity("worn_share", share, max(share - edge, 0.0), share + edge)
 
 
@@ -607,5 +599,5 @@ def _compare_waves(result: Comparison, direction: str) -> dict[str, Quantity]:
     places = depths.x if axis or depths.y is None else depths.y
     ends = [track.values[name].value for track in result.tracks for name in ("from", "to")]
     ends = np.searchsorted(depths.x, [end for end in ends if end is not None])
-    lines = [np.atleast_2d(np.moveaxis(z, axis, -1)) for z in (depths.before, depths.after)]
+    lines = [np.atleast_2d(np.moveaxis(z, axis, -1)) for z in depths.heights]
     return waves.compare_waves(lines, measure_step(places), depths.noise_level, ends)

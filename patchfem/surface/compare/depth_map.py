@@ -10,8 +10,6 @@ import numpy as np
 from .statistics import remove_long_waves, subtract_local_level
 
 UNWORN_LIMIT_DEVIATIONS = 2.5  # standard deviations within which a depth counts as unworn
-# Variance of an even distribution over an interval of length 1
-EVEN_VARIANCE = 1 / 12
 # Errors relative to those that the tiles show, which are few.
 FEW_TILES_ERROR_FACTOR = 1.3
 
@@ -33,32 +31,45 @@ class DepthErrors(NamedTuple):
     gain: float = 0.0
 
 
+class PointMasks(NamedTuple):
+    """Masks (n,) or (m, n) of the points of aligned surfaces.
+
+    - unworn, worn, grown: points by their depth.
+    - inside, missing: common part, and its points without a depth.
+    """
+
+    unworn: np.ndarray
+    worn: np.ndarray
+    grown: np.ndarray
+    inside: np.ndarray
+    missing: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class DepthMap:
     """Aligned traces at x (n,) [m] of the second one, or scans (m, n) at x (n,), y (m,) [m] of the first one.
 
-    - before, after: heights [m] about the least-squares line or plane of the first surface, filled where missing.
-    - depth, noise: worn depth and the standard deviation of an unworn one [m], filled where missing.
-    - unworn, worn, grown: masks.
     - y: None for traces.
-    - inside, missing: masks of the common part, and of its points without a depth.
+    - before: heights [m] of the first surface about its least-squares line or plane, filled where missing.
+    - depth, noise: worn depth and the standard deviation of an unworn one [m], filled where missing.
+    - masks: worn points, and others.
     - cell: length [m] or area [m2] of a point.
     - errors: errors that the unworn heights show.
     """
 
     x: np.ndarray
+    y: np.ndarray | None
     before: np.ndarray
-    after: np.ndarray
     depth: np.ndarray
     noise: np.ndarray
-    unworn: np.ndarray
-    worn: np.ndarray
-    grown: np.ndarray
-    y: np.ndarray | None = None
-    inside: np.ndarray | None = None
-    missing: np.ndarray | None = None
-    cell: float = 0.0
-    errors: DepthErrors | None = None
+    masks: PointMasks
+    cell: float
+    errors: DepthErrors
+
+    @property
+    def heights(self) -> tuple[np.ndarray, np.ndarray]:
+        """Heights [m] of the first and of the second surface about the line or plane of the first one."""
+        return self.before, self.before - self.depth
 
     @property
     def noise_level(self) -> float:
@@ -68,17 +79,17 @@ class DepthMap:
     @property
     def size(self) -> float:
         """Length [m] or area [m2] of the common part."""
-        return float(self.inside.sum()) * self.cell
+        return float(self.masks.inside.sum()) * self.cell
 
     @property
     def level_error(self) -> float:
         """Standard deviation [m] of the mean depth of the common part."""
-        return float(np.sqrt(self.errors.variance(self.inside)) / self.inside.sum())
+        return float(np.sqrt(self.errors.variance(self.masks.inside)) / self.masks.inside.sum())
 
     @cached_property
     def scatter(self) -> float:
         """Standard deviation [m] of worn depths about the mean of the worn depths around them."""
-        beside = subtract_local_level(self.depth, self.worn)[self.worn]
+        beside = subtract_local_level(self.depth, self.masks.worn)[self.masks.worn]
         known = beside[np.isfinite(beside)]
         return float(known.std()) if known.size else 0.0
 
@@ -92,7 +103,8 @@ class DepthMap:
             np.diff(self.depth, axis=k, append=np.take(self.depth, [-1], k))
             for k in range(self.depth.ndim)
         ]
-        return EVEN_VARIANCE * sum(step**2 for step in steps)
+        # Variance of an even distribution
+        return 1 / 12 * sum(step**2 for step in steps)
 
     def integrate(self, part, sign: float = 1.0) -> tuple[float, float]:
         """Integrate the depth over a mask, and return area [m2] or volume [m3] and its standard deviation.
@@ -102,7 +114,7 @@ class DepthMap:
         value = sign * float(self.depth[part].sum()) * self.cell + 0.0  # no negative zero
         error = FEW_TILES_ERROR_FACTOR * np.sqrt(self.errors.variance(part))
         # The line over a gap misses the tops in it, which are worn deeper, and its valleys.
-        gaps = self.scatter * float((part & self.missing).sum())
+        gaps = self.scatter * float((part & self.masks.missing).sum())
         sampling = np.sqrt(self.step_variance[part].sum())
         return value, self.cell * float(np.sqrt(error**2 + gaps**2 + sampling**2))
 
@@ -114,9 +126,9 @@ class DepthMap:
         """
         limit = 2 * UNWORN_LIMIT_DEVIATIONS
         relative = np.clip(self.depth / self.noise, -limit, limit)
-        beside = self.inside & ~covered & ~self.missing
+        beside = self.masks.inside & ~covered & ~self.masks.missing
         loss_beside = max(float((relative * self.noise)[beside].sum()) * self.cell, 0.0)
-        height = remove_long_waves(self.before + self.after)
-        valleys = relative[self.unworn & (height < np.median(height))]
+        height = remove_long_waves(sum(self.heights))
+        valleys = relative[self.masks.unworn & (height < np.median(height))]
         lowered = max(-float(np.median(valleys)), 0.0) if valleys.size else 0.0
         return loss_beside + lowered * self.noise_level * self.size

@@ -13,6 +13,7 @@ from .depth_map import (
     UNWORN_LIMIT_DEVIATIONS,
     DepthErrors,
     DepthMap,
+    PointMasks,
 )
 from .fit import Fit
 from .model import Model
@@ -26,7 +27,6 @@ N_DATUM_ERROR_TILES = {1: 40, 2: 8}
 MIN_INDEPENDENT_TILES = 3.0
 # Distance from the largest mean, in its standard deviations, within which other means are counted as equally deep
 NEAR_DEVIATIONS = 2.0
-MEDIAN_SIDE = {1: 5, 2: 3}  # side of the window whose median leaves outliers out, by number of axes
 
 
 def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
@@ -55,9 +55,9 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     depth = fill_gaps(model.draw(fit.depth))[box]
     noise = model.draw(fit.noise)[box]
     noise = np.where(np.isnan(noise), np.median(fit.noise), noise)
-    masks = {
-        name: model.draw(getattr(fit, name), False)[box] for name in ("unworn", "worn", "grown")
-    }
+    unworn, worn, grown = (
+        model.draw(mask, False)[box] for mask in (fit.unworn, fit.worn, fit.grown)
+    )
     first = fill_gaps(model.sampled.z)[box]
     if model.n_axes == 1:
         # The sampled heights are those of the second trace, with its gain.
@@ -66,7 +66,6 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
     before = subtract_plane(first, base[: 1 + model.n_axes])
 
     # An error of the gain moves the heights of the second surface that stand out of the datum.
-    unworn = masks["unworn"]
     shifts = [gain_error * (subtract_plane(before, base, unworn) - depth)]
     if model.n_axes == 1:
         shifts.append(_bend_datum(depth, unworn, base))
@@ -79,12 +78,9 @@ def make_depths(model: Model, fit: Fit, gain_error: float = 0.0) -> DepthMap:
         x=axes[-1],
         y=axes[0] if model.n_axes > 1 else None,
         before=before,
-        after=before - depth,
         depth=depth,
         noise=noise,
-        **masks,
-        inside=inside,
-        missing=inside & ~model.known[box],
+        masks=PointMasks(unworn, worn, grown, inside, inside & ~model.known[box]),
         cell=float(np.prod(model.sampled.steps)),
         errors=errors._replace(gain=gain_error),
     )
@@ -115,14 +111,9 @@ def make_section(x, depth, sigma: float, worn, missing) -> DepthMap:
         x=x,
         y=None,
         before=0.0 * depth,
-        after=-depth,
         depth=depth,
         noise=noise,
-        unworn=unworn,
-        worn=worn,
-        grown=nothing,
-        inside=~nothing,
-        missing=missing,
+        masks=PointMasks(unworn, worn, nothing, ~nothing, missing),
         cell=float(np.diff(x).mean()),
         errors=estimate_errors(depth, noise, unworn, base),
     )
@@ -284,15 +275,15 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     n_axes = depths.depth.ndim
     # Noise relative to the median above which a depth cannot be the largest
     is_sure = depths.noise < 4.0 * depths.noise_level
-    if (is_sure & depths.worn).any():
-        is_sure &= depths.worn
+    if (is_sure & depths.masks.worn).any():
+        is_sure &= depths.masks.worn
     depth = np.where(is_sure, depths.depth, np.minimum(depths.depth, 0.0))
     correlation = depths.errors.correlation
     sides = WINDOW_SIDES[n_axes]
     single = _find_extreme(depth, depths.noise, 1, correlation)
 
-    # Medians leave single outliers out, and scatter a little more than means.
-    medians = ndimage.median_filter(depth, MEDIAN_SIDE[n_axes])
+    # Medians over 5 samples, or 3 x 3, leave single outliers out, and scatter a little more than means.
+    medians = ndimage.median_filter(depth, {1: 5, 2: 3}[n_axes])
     # Variance of the median of normal errors relative to that of their mean, pi/2
     noise = np.sqrt(1.57) * depths.noise
     wide = [_find_extreme(medians, noise, side, correlation) for side in sides[1:]]
@@ -317,7 +308,7 @@ def measure_largest(depths: DepthMap) -> tuple[Quantity, np.ndarray]:
     every_second = product((slice(0, None, 2), slice(1, None, 2)), repeat=n_axes)
     high += single.value - float(np.mean([depth[part].max() for part in every_second]))
     # A missing height may be as much deeper than the line over its gap as worn depths scatter about those beside them.
-    gaps = depths.missing & ndimage.binary_dilation(depths.worn)
+    gaps = depths.masks.missing & ndimage.binary_dilation(depths.masks.worn)
     if gaps.any():
         high = max(high, float(depths.depth[gaps].max()) + HALF_WIDTH_95 * depths.scatter)
     near = medians > value - NEAR_DEVIATIONS * best.sigma

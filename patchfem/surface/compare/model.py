@@ -29,14 +29,9 @@ from .tops import find_worn_tops
 
 # Distance from the border of a surface from which on its spline is accurate
 INACCURATE_BORDER_SAMPLES = 3
-N_DATUM_TILES = {1: 20, 2: 8}  # number of tiles along each side, whose modes span the datums
-# Side of a surface relative to the standard deviation of a Gaussian. The waves longer than it are not used to refine the
-# place.
-SIDE_OVER_PLACE_GAUSSIAN = {1: 100, 2: 20}
 # Standard deviations in samples of the Gaussians that smooth both surfaces, one for each step that refines the place
 REFINING_GAUSSIAN_SAMPLES = (16, 8, 4, 3, 2, 1, 0, 0, 0)
 MAX_GAIN_CHANGE = 0.3  # largest change of the gain of an instrument
-MAX_COMPARED_DATUMS = 3000  # number of datums through modes of tiles that are compared
 
 
 class Model:
@@ -213,7 +208,7 @@ class Model:
     @cached_property
     def smoothing(self) -> np.ndarray:
         """Standard deviations (d,), in samples, of the Gaussian that removes the long waves when the position is refined."""
-        sizes = np.array(self.sampled.z.shape) / SIDE_OVER_PLACE_GAUSSIAN[self.n_axes]
+        sizes = np.array(self.sampled.z.shape) / {1: 100, 2: 20}[self.n_axes]
         # Smallest standard deviation, in samples of a trace, of the Gaussian whose longer waves are
         # not used to refine the place
         return np.maximum(sizes, 10.0) if self.n_axes == 1 else sizes
@@ -232,7 +227,8 @@ class Model:
         `state` is that of `compute_depth`.
         """
         numbers = self.draw(np.arange(self.known.sum()), -1)[find_box(self.known)]
-        parts = [numbers[part] for part in split_tiles(numbers.shape, N_DATUM_TILES[self.n_axes])]
+        # The modes of tiles span the datums
+        parts = [numbers[part] for part in split_tiles(numbers.shape, {1: 20, 2: 8}[self.n_axes])]
         # Smallest number of known heights in a tile
         tiles = [part[part >= 0] for part in parts if (part >= 0).sum() >= 4]
         ends = [tiles[0], tiles[-1]] if self.n_axes == 1 else []
@@ -262,14 +258,12 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     """
     random = np.random.default_rng(0)
 
-    # Candidates: the datums through the most frequent depths (modes) of k tiles, of every subset of tiles up to
-    # MAX_COMPARED_DATUMS
+    # Candidates: the datums through the most frequent depths (modes) of k tiles, of at most 3000 subsets of tiles
     modes = np.array([find_mode(depth[tile]) for tile in tiles])
     centers = np.array([base[tile].mean(axis=0) for tile in tiles])
     subsets = np.array(list(combinations(range(len(tiles)), base.shape[1])))
-    subsets = subsets[random.permutation(len(subsets))[:MAX_COMPARED_DATUMS]]
-    # Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not
-    # determine a datum.
+    subsets = subsets[random.permutation(len(subsets))[:3000]]
+    # Smallest determinant of the mean datum functions of some tiles. Below it these tiles do not determine a datum.
     subsets = subsets[np.abs(np.linalg.det(centers[subsets])) > 1e-3]
     datums = np.linalg.solve(centers[subsets], -modes[subsets][..., None])[..., 0]
 
@@ -297,8 +291,7 @@ def find_datum(base, depth, tiles: list, ends: list) -> np.ndarray:
     # smallest one. Datums of larger scale are not compared.
     near = np.flatnonzero(scales <= 4.0 * scales.min())
     relative = (few + datums[near] @ few_base.T) / max(scales.min(), 1e-15)
-    # Distance of a height from a datum, relative to the smallest scale, within which it agrees with
-    # the datum
+    # Distance of a height from a datum, relative to the smallest scale, within which it agrees with the datum
     agrees = np.abs(relative) < 5.0
     has_end = np.zeros(near.size, bool)
     for end in ends:

@@ -17,10 +17,6 @@ TRIED_TURNS = {
     1: np.linspace(-0.01, 0.01, 11),
     2: np.concatenate((TRIED_ROTATIONS, TRIED_ROTATIONS + np.pi)),
 }
-# Points along the longer side of the images that are correlated
-MAX_IMAGE_SIDE_POINTS = {1: 4000, 2: 96}
-# Side of an image relative to the standard deviation of the Gaussian of its long waves, by number of axes
-SIDE_OVER_IMAGE_GAUSSIAN = {1: 40, 2: 12}
 
 
 class Place(NamedTuple):
@@ -77,7 +73,8 @@ def find_place(first: Raster, second: Raster) -> Place:
     n_axes = first.z.ndim
     longest = max(first.lengths.max(), second.lengths.max())
     finest = min(first.steps.min(), second.steps.min())
-    pixel = max(finest, longest / MAX_IMAGE_SIDE_POINTS[n_axes])
+    # Points along the longer side of the images that are correlated
+    pixel = max(finest, longest / {1: 4000, 2: 96}[n_axes])
 
     best = Place(np.zeros(n_axes), 0.0, significance=-np.inf)
     for mirrored in (False, True):
@@ -120,7 +117,7 @@ def _make_images(surface: Raster, pixel: float) -> tuple[np.ndarray, ...]:
     z = ndimage.affine_transform(
         z, pixel / surface.steps, output_shape=tuple(shape), order=1, mode="nearest"
     )
-    z = remove_long_waves(z, SIDE_OVER_IMAGE_GAUSSIAN[z.ndim])
+    z = remove_long_waves(z, {1: 40, 2: 12}[z.ndim])
     clipped = np.clip(z, -3 * z.std(), 3 * z.std())
     valleys = np.minimum(clipped, np.median(z))
     valleys = valleys - valleys.mean()

@@ -13,11 +13,7 @@ from .statistics import compute_threshold, remove_long_waves
 # Ratio of worn tops to filled valleys, or of lost to grown material, above which it is wear. Its reverse shows growth.
 LOSS_TO_GROWTH_RATIO = 3.0
 N_HEIGHT_CLASSES = 10  # number of classes of heights whose depths are compared
-N_VALLEY_CLASSES = 3  # number of the lowest classes, which wear last
 N_TOP_CLASSES = 6  # number of the highest classes
-# Smallest rise of the median depth from valleys to tops, in standard deviations of a depth, and of a median.
-MIN_DEPTH_RISE_DEVIATIONS = 0.2
-MIN_RISE_IN_MEDIAN_DEVIATIONS = 3.5
 
 
 def find_worn_tops(relative, height, max_gain_change: float) -> np.ndarray:
@@ -81,9 +77,10 @@ def _find_lowered_tops(relative, height, max_gain_change: float) -> np.ndarray:
         return is_worn
     classes = np.array_split(np.argsort(height), N_HEIGHT_CLASSES)
     rise, above = (_subtract_valleys(values, classes) for values in (relative, height))
-    scatter = MIN_RISE_IN_MEDIAN_DEVIATIONS / np.sqrt(len(classes[0]))
+    # Smallest rise of the median depth from valleys to tops: 3.5 of its standard deviations, and .2 of those of a depth
+    scatter = 3.5 / np.sqrt(len(classes[0]))
     gained = max_gain_change * np.median(above[-N_TOP_CLASSES:])
-    limit = MIN_DEPTH_RISE_DEVIATIONS + scatter + gained
+    limit = 0.2 + scatter + gained
     if np.median(rise[-N_TOP_CLASSES:]) > limit:
         for part, step in zip(classes, rise):
             is_worn[part] = step > limit
@@ -96,7 +93,8 @@ def _subtract_valleys(values, classes: list[np.ndarray]) -> np.ndarray:
     `classes` are the indices of the values in each class, the lowest one first.
     """
     medians = np.array([np.median(values[part]) for part in classes])
-    return medians - np.median(medians[:N_VALLEY_CLASSES])
+    # The lowest classes wear last
+    return medians - np.median(medians[:3])
 
 
 class Tops(NamedTuple):
@@ -119,14 +117,14 @@ def find_tops(depths: DepthMap) -> Tops:
     """
     height = remove_long_waves(depths.before)
     relative = depths.depth / depths.noise
-    is_deep = depths.worn & (relative > UNWORN_LIMIT_DEVIATIONS)
+    is_deep = depths.masks.worn & (relative > UNWORN_LIMIT_DEVIATIONS)
     if not is_deep.any():
         return Tops(np.zeros(0, int), np.zeros(0), is_deep)
     # Quantile of the worn heights above which a height is a top
     is_high = height > np.quantile(height[is_deep], 0.25)
     runs = find_runs(is_high)
     tops = np.array([first + int(np.argmax(height[first : last + 1])) for first, last in runs], int)
-    tops = tops[~depths.missing[tops] & ~depths.worn[tops]]
+    tops = tops[~depths.masks.missing[tops] & ~depths.masks.worn[tops]]
     # A top is a few samples wide, whose noise is partly independent.
     # Number of samples whose mean depth shows whether a top is worn
     return Tops(tops, ndimage.uniform_filter1d(relative, 3)[tops], is_high)

@@ -23,12 +23,7 @@ FLANK_OVER_TRACK_WIDTH = 0.1
 MAX_SAMPLES_TO_CUT_END = 5
 # Powers of the distance from the end in the forms of a flank: cliff, cliff with a slope, wedge, round.
 FLANK_POWERS = ((0,), (0, 1), (1,), (2,), (1, 2), (2, 3))
-FITTED_FLANK_DEVIATIONS = 25.0  # depth, in standard deviations, to which a flank is fitted
 MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the surface beside it
-# Largest number of samples in which a flank reaches FITTED_FLANK_DEVIATIONS
-MAX_FLANK_SAMPLES = 400
-# Squared residual of a single depth beyond which it counts no more
-MAX_SQUARED_DEPTH_RESIDUAL = 16.0
 
 
 class End(NamedTuple):
@@ -60,9 +55,9 @@ def find_spans(depths: DepthMap) -> list[tuple[int, int]]:
     list of tuple
         (first, last) of each track.
     """
-    changed = depths.worn | (np.abs(depths.depth) > UNWORN_LIMIT_DEVIATIONS * depths.noise)
+    changed = depths.masks.worn | (np.abs(depths.depth) > UNWORN_LIMIT_DEVIATIONS * depths.noise)
     tops = find_tops(depths)
-    spans = find_runs(depths.worn)
+    spans = find_runs(depths.masks.worn)
     k = 0
     while k < len(spans) - 1:
         (first, stop), (start, last) = spans[k : k + 2]
@@ -105,7 +100,7 @@ def find_ends(depths: DepthMap, span: tuple[int, int]) -> tuple[End, End]:
     """
     # Pile-up beside a track is no flank; the windows that found the worn samples may reach into it.
     relative = depths.depth / depths.noise
-    relative = np.where(depths.grown | (relative < -UNWORN_LIMIT_DEVIATIONS), 0.0, relative)
+    relative = np.where(depths.masks.grown | (relative < -UNWORN_LIMIT_DEVIATIONS), 0.0, relative)
     middle = (span[0] + span[1]) // 2
     count = relative.size
 
@@ -177,12 +172,13 @@ def _find_change_point(x, relative, worn: int, depths: DepthMap) -> End:
     step = float(np.median(np.diff(x)))
     if worn < 3:
         return End(float(x[worn]), float(x[0] - step), float(x[worn]))
-    # Above half of its depth, the floor of a shallow track begins.
-    inner = relative[worn : worn + MAX_FLANK_SAMPLES]
-    height = min(FITTED_FLANK_DEVIATIONS, np.quantile(inner, 0.9) / 2)
+    # A flank is fitted to a depth of 25 standard deviations, which it reaches within 400 samples. Above half of its depth,
+    # the floor of a shallow track begins.
+    inner = relative[worn : worn + 400]
+    height = min(25.0, np.quantile(inner, 0.9) / 2)
     # Standard deviations of a single height on a flank.
     deep = np.flatnonzero(inner > max(height, 4.0))
-    # Number of samples of a flank that stays below FITTED_FLANK_DEVIATIONS
+    # Number of samples of a flank that stays below this depth
     length = int(deep[0]) + 3 if deep.size else 60
     stop = min(worn + length, x.size)
     low = max(worn - max(length, MIN_FLANK_SAMPLES), 0)
@@ -249,9 +245,9 @@ def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
         right = np.einsum("mni,ln->mil", base, depths)
         fitted = base @ np.linalg.solve(normal, right)
 
-        # A large residual counts as MAX_SQUARED_DEPTH_RESIDUAL, so that single outliers do not decide.
+        # A large residual counts as four standard deviations, so that single outliers do not decide.
         residual = depths.T - fitted
-        deviance[:, form] = np.minimum(residual**2, MAX_SQUARED_DEPTH_RESIDUAL).sum(axis=1).T
+        deviance[:, form] = np.minimum(residual**2, 16.0).sum(axis=1).T
     # Depths whose scatter exceeds the noise carry less information.
     return deviance / max(correlation, float(deviance[0].min()) / x.size)
 
@@ -282,7 +278,7 @@ def measure_track(
     shorter = start.high - start.value + end.value - end.low
     longer = start.value - start.low + end.high - end.value
     if lost is None:
-        area, error = depths.integrate((x >= start.value) & (x <= end.value) & ~depths.grown)
+        area, error = depths.integrate((x >= start.value) & (x <= end.value) & ~depths.masks.grown)
         # The ends are uncertain by the area between the bounds of their intervals.
         for place in (start, end):
             near = depths.integrate((x >= place.low) & (x <= place.high))[0]
@@ -370,7 +366,7 @@ def _measure_pile_up(depths: DepthMap, ends: tuple[End, End], width: float) -> t
     for end, sign in zip(ends, (-1, 1)):
         distance = (depths.x - end.value) * sign
         is_beside = (distance >= 0) & (distance <= width)
-        grown = distance[is_beside & depths.grown]
+        grown = distance[is_beside & depths.masks.grown]
         if not grown.size:
             area, error = depths.integrate(
                 is_beside & (distance <= FLANK_OVER_TRACK_WIDTH * width), -1.0

@@ -18,7 +18,7 @@ def find_sure_loss(depths: DepthMap) -> float:
 
     `depths` gives the number of places and of independent tiles.
     """
-    n_places = depths.inside.sum() / max(depths.worn.sum(), 1)
+    n_places = depths.masks.inside.sum() / max(depths.masks.worn.sum(), 1)
     freedom = depths.errors.freedom
     student = special.stdtrit(freedom, (0.975, 1 - FALSE_POSITIVE_RATE / n_places))
     return float(HALF_WIDTH_95 * student[1] / student[0])
@@ -30,11 +30,11 @@ def measure_sharp_loss(depths: DepthMap) -> tuple[float, float]:
     It is measured from the unworn heights around the tops. No drift is so sharp, so that this loss is wear beyond doubt.
     `depths` are those of a trace or a scan.
     """
-    if not depths.worn.any():
+    if not depths.masks.worn.any():
         return 0.0, 0.0
-    relative = subtract_local_level(depths.depth, depths.unworn) / depths.noise
-    relative = np.where(np.isnan(relative) | depths.missing, 0.0, relative)
-    height = (depths.before + depths.after) / 2 / depths.noise_level
+    relative = subtract_local_level(depths.depth, depths.masks.unworn) / depths.noise
+    relative = np.where(np.isnan(relative) | depths.masks.missing, 0.0, relative)
+    height = sum(depths.heights) / 2 / depths.noise_level
     tops = find_worn_tops(relative, height, HALF_WIDTH_95 * depths.errors.gain)
     value = float((relative * depths.noise)[tops].sum()) * depths.cell
     noise = np.sqrt(depths.errors.correlation * (depths.noise[tops] ** 2).sum()) * depths.cell

@@ -17,20 +17,7 @@ from .records import COMPARISON_DEFINITIONS, name_quantity, name_unknown
 from .statistics import make_polynomials, smooth
 from .track import get_margin
 
-MAX_RATIO_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
-MIN_RATIO_BLOCKS = 4  # smallest number of blocks
-# Smallest length of a block in the longest wave; shorter blocks are correlated
-MIN_BLOCK_WAVES = 2.0
-# Smallest length of a trace relative to the longest wave of the band
-MIN_TRACE_WAVES = 3.0
-MIN_STEPS_PER_WAVE = 4.0  # smallest length of the shortest wave of the band in steps
-# Shortest wave of the slope in steps. Interpolation between samples changes the slope of longer ones by less than 1 %.
-SHORTEST_SLOPE_WAVE_STEPS = 8.0
 RATIO_NAMES = ("amplitude_ratio", "slope_ratio")
-# Power of the mean over sections that gives a size of the roughness.
-SECTION_MEAN_POWERS = {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}
-# Degree of the polynomial that is the form of a part: the bottom of a track is bent.
-FORM_DEGREE_BY_PART = {"inside": 4, "outside": 1}
 
 
 def compare_waves(
@@ -63,12 +50,14 @@ def compare_waves(
     for end in ends:
         is_kept &= np.abs(np.arange(is_kept.size) - end) > WAVE_BAND[1] / step
     length = is_kept.sum() * step
-    if length < MIN_TRACE_WAVES * WAVE_BAND[1] or step > WAVE_BAND[0] / MIN_STEPS_PER_WAVE:
+    # A trace needs three of the longest waves, and four steps per shortest wave
+    if length < 3.0 * WAVE_BAND[1] or step > WAVE_BAND[0] / 4.0:
         return {name: name_unknown(name, "band") for name in RATIO_NAMES}
 
     # The shape of a track has no part in its waves: the second filter removes what the first one leaves of a bend.
     lines = [_subtract_polynomial(line, 1) for line in lines]
-    waves = (*WAVE_BAND, SHORTEST_SLOPE_WAVE_STEPS * step)
+    # Interpolation between samples changes the slope of waves longer than 8 steps by less than 1 %
+    waves = (*WAVE_BAND, 8.0 * step)
     # The deviation of the Gaussian filter of ISO 16610-21 is .187 of its cut-off.
     deviations = [(0.0, 0.187 * wave / step) for wave in waves]
     lines = [z - smooth(z, deviations[1]) for z in lines]
@@ -79,9 +68,8 @@ def compare_waves(
     white = noise / np.sqrt(2)
     band_noise = white * np.sqrt(2 * step * (1 / WAVE_BAND[0] - 1 / WAVE_BAND[1]))
     slope_noise = white / step * np.sqrt(1 / (4 * np.sqrt(np.pi) * deviations[2][1] ** 3))
-    n_blocks = int(
-        np.clip(length / (MIN_BLOCK_WAVES * WAVE_BAND[1]), MIN_RATIO_BLOCKS, MAX_RATIO_BLOCKS)
-    )
+    # Blocks that are shorter than two of the longest waves are correlated; 4 to 12 blocks show the scatter of a ratio
+    n_blocks = int(np.clip(length / (2.0 * WAVE_BAND[1]), 4, 12))
     values = {}
     errors = (band_noise, slope_noise)
     for name, sizes, error in zip(RATIO_NAMES, (passed, slopes), errors):
@@ -195,14 +183,16 @@ def measure_roughness(
     edge = int(np.ceil(cutoff / 2 / step))
     for region, runs in parts.items():
         sizes = {}
-        for side in ("before", "after"):
+        for side, z in zip(("before", "after"), depths.heights):
             sections = []
             for first, last in runs:
-                z = getattr(depths, side)[first + edge : last + 1 - edge]
-                sections += _cut_sections(z, cutoff / step, FORM_DEGREE_BY_PART[region])
+                part = z[first + edge : last + 1 - edge]
+                # The bottom of a track is bent
+                sections += _cut_sections(part, cutoff / step, {"inside": 4, "outside": 1}[region])
             sizes[side] = _measure_sections(sections, step)
         table = {"before": {}, "after": {}, "ratio": {}}
-        for name, power in SECTION_MEAN_POWERS.items():
+        # Power of the mean over sections that gives a size of the roughness
+        for name, power in {"Ra": 1.0, "Rq": 0.5, "slope": 0.5}.items():
             pair = [sizes[side][name] for side in ("before", "after")]
             for side, values in zip(table, pair):
                 bounds = _divide_means(np.ones(len(values)), values, power)

@@ -14,7 +14,6 @@ BYTES_PER_MEBIBYTE = 2**20  # number of bytes in a mebibyte
 MAX_SURFACE_FILE_BYTES = 512 * BYTES_PER_MEBIBYTE
 # Largest size of a text file, in bytes: four million samples
 MAX_TEXT_BYTES = 64 * BYTES_PER_MEBIBYTE
-N_FORMAT_BYTES = 4096  # number of bytes at the start of a file that determine its format
 _FIRST_BYTES = {  # format of a file by its first bytes
     b"\x1f\x8b": "gzip",
     b"\x93NUMPY": "npy",
@@ -77,7 +76,8 @@ def _read_limited(path: Path, suffix: str, file) -> Content:
 
     `path` names it in messages, and `suffix` is that of its name, such as ".CSV".
     """
-    data = bytearray(file.read(N_FORMAT_BYTES))
+    # Bytes at the start of a file that determine its format
+    data = bytearray(file.read(4096))
     # Numbers below five are control characters, which a text has only if it is damaged.
     is_binary = bool(set(data) & set(range(5))) and suffix.lower() not in (".csv", ".txt")
     kind = "instrument" if is_binary else "text"

@@ -78,6 +78,5 @@ def read_instrument(content: Content) -> Table:
         {} if unit is None else dict.fromkeys(columns, "m"),
         str(path),
         notes=(note,),
-        are_units_fixed=unit is not None,
-        remedy="export the surface as text",
+        remedy="export the surface as text" if unit is None else "",
     )

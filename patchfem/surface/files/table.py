@@ -34,8 +34,7 @@ class Table(NamedTuple):
     - place: file, with the line that names the columns if there is one.
     - lines: line of the file of each sample, or None if the file has no lines.
     - notes: sentences on the file.
-    - are_units_fixed: whether the format defines or always states its units.
-    - remedy: how the file would state its units.
+    - remedy: how the file would state its units; "" if its format always states them.
     - length: length of the scan [m], if the header gives it.
     """
 
@@ -45,9 +44,13 @@ class Table(NamedTuple):
     place: str
     lines: np.ndarray | None = None
     notes: tuple[str, ...] = ()
-    are_units_fixed: bool = False
     remedy: str = HEADER_EXAMPLE
     length: float | None = None
+
+    @property
+    def has_fixed_units(self) -> bool:
+        """Return whether the format of the file defines or always states its units."""
+        return not self.remedy
 
     def add_note(self, text: str) -> "Table":
         """Return the table with a further sentence about the file, `text`."""
@@ -80,7 +83,7 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
     """
     size = table.columns["z"].size
     refuse_many_heights(table.path, size)
-    if units is not None and table.are_units_fixed:
+    if units is not None and table.has_fixed_units:
         table = table.add_note("the file states its own units; the units that you gave are ignored")
         units = None
 
@@ -108,7 +111,7 @@ def make_surface(table: Table, units: tuple[str, str] | None = None) -> Profile 
         table, places = _undo_rounding(table, coordinate, places)
         _require_increase(table, coordinate, places)
         axes.append(frozen_array(places))
-    has_sure_units = table.are_units_fixed or units is not None
+    has_sure_units = table.has_fixed_units or units is not None
     notes = _check_span(table.path, max(map(np.ptp, axes)), z, has_sure_units=has_sure_units)
     surface = Profile if z.ndim == 1 else Areal
     return surface(*reversed(axes), frozen_array(z), str(table.path), table.notes + notes)

@@ -32,13 +32,6 @@ from .header import (
 from .table import Table
 from .units import HEADER_EXAMPLE, MISSING_SIZE_REMEDY, parse_length_unit
 
-# Largest relative range of the steps of coordinates; the steps of heights vary more.
-COORDINATE_STEP_TOL = 1e-6
-# Pattern of a number in quotes with a decimal comma
-_QUOTED_NUMBER_PATTERN = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
-# Pattern of a control character, which no text contains
-_CONTROL_CHARACTER_PATTERN = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
-
 
 def read_text(content: Content, *, has_units: bool = False) -> Table:
     """Read the columns or the matrix in the content of a text file.
@@ -77,12 +70,15 @@ def _decode(content: Content) -> str:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
-    if _CONTROL_CHARACTER_PATTERN.search(text):
+    # No text contains control characters
+    if re.search(r"[\x00-\x08\x0e-\x1f\x7f]", text):
         raise PatchfemError(
             f"{content.path}: not a text file; export the profile as text with two columns and {HEADER_EXAMPLE}"
         )
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    return _QUOTED_NUMBER_PATTERN.sub(r"\1.\2", text).replace('"', "")
+    # Numbers in quotes with a decimal comma
+    text = re.sub(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"', r"\1.\2", text)
+    return text.replace('"', "")
 
 
 def _find_coordinates(
@@ -179,9 +175,10 @@ def _make_matrix(path, facts: dict[str, str], z) -> Table:
 
 
 def _is_even(values: np.ndarray) -> bool:
-    """Return whether values (n,) increase by equal steps, within COORDINATE_STEP_TOL of the first step."""
+    """Return whether values (n,) increase by equal steps, within 1e-6 of the first step."""
     steps = np.diff(values)
-    return bool(steps[0] > 0 and np.ptp(steps) < COORDINATE_STEP_TOL * steps[0])
+    # The steps of heights vary more
+    return bool(steps[0] > 0 and np.ptp(steps) < 1e-6 * steps[0])
 
 
 def _read_rows(

@@ -11,8 +11,6 @@ from ...formatting import format_length
 from ..areal import Areal, level
 from ..profile import Profile, measure_step, resample_evenly
 
-# Width of the weights relative to the cut-off; a wave of the cut-off keeps half its height.
-WIDTH_OVER_CUTOFF = np.sqrt(np.log(2) / np.pi)
 MIN_CUTOFF_STEPS = 4  # smallest cut-off in steps; the samples do not resolve a shorter one
 
 
@@ -109,4 +107,5 @@ def _gaussian_weights(cutoff: float, count: int) -> tuple[np.ndarray, np.ndarray
     # Half-length of the weights relative to the cut-off; 1.5e-10 of their sum lies beyond.
     half = min(int(np.ceil(1.25 * cutoff)), count - 1)
     offsets = np.arange(-half, half + 1.0)
-    return offsets, np.exp(-np.pi * (offsets / (WIDTH_OVER_CUTOFF * cutoff)) ** 2)
+    # A wave of the cut-off keeps half its height
+    return offsets, np.exp(-np.pi * (offsets / (np.sqrt(np.log(2) / np.pi) * cutoff)) ** 2)

@@ -12,9 +12,6 @@ from ..quantity import read_definitions
 MIN_TRACE_SAMPLES = 16
 # Largest heights of a straight line after levelling, relative to those before
 HEIGHT_ROUND_OFF = 1e-12
-MIN_HILL_HEIGHT_OVER_RZ = 0.10  # smallest height of hills and dales that count, relative to Rz
-# Smallest width of hills and dales that count, relative to the section
-MIN_HILL_WIDTH_FRACTION = 0.01
 MIN_SECTIONS = 5  # smallest number of sections whose scatter gives intervals
 # Parameters without an interval: extremes and high moments of a whole trace depend on single heights, so that the
 # scatter of sections does not show their errors.
@@ -79,9 +76,9 @@ def _compute_element_length(z, step: float, rough: float, section: float) -> flo
     step : float
         Sampling interval [m].
     rough : float
-        Rz [m], of which a hill or dale must have the fraction MIN_HILL_HEIGHT_OVER_RZ.
+        Rz [m], of which a hill or dale must have a tenth.
     section : float
-        Length of a section [m], of which a hill or dale must have the fraction MIN_HILL_WIDTH_FRACTION.
+        Length of a section [m], of which a hill or dale must have a hundredth.
     """
     above = z > 0
     starts = np.flatnonzero(above[1:] != above[:-1])  # the last sample before each crossing
@@ -91,9 +88,7 @@ def _compute_element_length(z, step: float, rough: float, section: float) -> flo
     first = np.append(0, starts + 1)
     extent = np.maximum.reduceat(np.abs(z), first)
     width = np.diff(places, prepend=-np.inf, append=np.inf)  # the ends of the trace cut two off
-    is_kept = (extent >= MIN_HILL_HEIGHT_OVER_RZ * rough) & (
-        width >= MIN_HILL_WIDTH_FRACTION * section
-    )
+    is_kept = (extent >= 0.10 * rough) & (width >= 0.01 * section)
     kept_indices = np.flatnonzero(is_kept)
     # A hill or dale begins at the crossing before it.
     ends = places[kept_indices[1:][np.diff(above[first[kept_indices]])] - 1]

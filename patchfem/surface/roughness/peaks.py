@@ -20,8 +20,6 @@ from ..profile import Profile, remove_spikes, resample_evenly
 from .filter import filter_surface
 from .parameters import HEIGHT_ROUND_OFF, MIN_TRACE_SAMPLES
 
-# Coefficient of 1/alpha in the variance of summit heights (Bush 1976)
-SUMMIT_VARIANCE_COEFFICIENT = 0.8968
 # Nayak's spectral width alpha of an isotropic surface whose waves all have the same length. No surface has less.
 MIN_SPECTRAL_WIDTH_ALPHA = 1.5
 # Ratio of the decay length u_0 to the rms height by Persson 2007, and by simulation (Pastewka 2013)
@@ -170,7 +168,8 @@ def gaussian_peaks(moments: Moments) -> Peaks:
     return Peaks(
         radius=3 / 8 * float(np.sqrt(np.pi / m4)),
         density=float(m4 / (6 * np.pi * np.sqrt(3) * m2)),
-        deviation=float(np.sqrt(m0 * (1 - SUMMIT_VARIANCE_COEFFICIENT / moments.alpha))),
+        # Bush (1976)
+        deviation=float(np.sqrt(m0 * (1 - 0.8968 / moments.alpha))),
     )
 
 

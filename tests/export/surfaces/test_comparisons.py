@@ -142,9 +142,7 @@ def test_curves_are_in_csv_and_netcdf():
     assert rows[0] == ["x [m]", "before [m]", "after [m]", "depth [m]"]
     table = np.array(rows[1:], float)
     curves = comparison.evidence.curves
-    for column, truth in zip(
-        table.T, (curves.x, curves.before, curves.after, curves.depth), strict=True
-    ):
+    for column, truth in zip(table.T, (curves.x, *curves.heights, curves.depth), strict=True):
         assert (column == truth).all()
     assert table[:, 1] - table[:, 2] == pytest.approx(table[:, 3], abs=1e-15)
     data = netcdf.to_dataset(answer)
@@ -154,9 +152,9 @@ def test_curves_are_in_csv_and_netcdf():
     band = float((data.depth_high - data.depth).mean())
     assert band == pytest.approx(1.96 * curves.noise.mean(), rel=1e-3)
     worn = data.state.values == 2  # not used, unworn, worn, grown
-    assert (worn == curves.worn).all()
+    assert (worn == curves.masks.worn).all()
     # a fifth of the heights, each of which stands for 1 of n parts, lie below the material ratio of 80 %
-    for side, heights in (("before", curves.before), ("after", curves.after)):
+    for side, heights in zip(("before", "after"), curves.heights):
         truth = np.sort(heights)[round(0.2 * heights.size - 0.5)]
         assert float(data[f"abbott_{side}"][160]) == pytest.approx(truth, abs=2e-9)
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.friction import Bonds, growth_numbers
+from patchfem.friction import BondGrowth, Bonds, growth_numbers
 from patchfem.friction.bonds.point_kernels import grow
 
 
@@ -21,7 +21,7 @@ def grow_length(law, length, v0, v1, path, time):
 
 def test_exact_growth_exponent_during_linear_reversal():
     """The growth exponent of a bond agrees with the integral over a velocity that changes linearly from -0.3 to 0.7."""
-    law = unit_bonds(rest_growth=0.3, slip_growth=1e30, rest_speed=0.01)
+    law = unit_bonds(growth=BondGrowth(0.3, 1e30, 0.01))
     rest = grow_length(law, 1.0, 1.0, -1.0, 0.0, 2.0)[1]
     assert np.exp(-rest) == pytest.approx(0.03462767, abs=1e-8)
     rest = grow_length(law, 1.0, -0.3, 0.7, 0.2, 1.0)[1]
@@ -45,9 +45,7 @@ def test_always_growth_is_independent_of_substeps(
     speed, time, n_substeps, ratio, rest_growth, slip_growth, rest_speed, initial_length
 ):
     """Bond growth at constant speed is the same in one step and in several substeps, and stays between its bounds."""
-    law = unit_bonds(
-        ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth, rest_speed=rest_speed
-    )
+    law = unit_bonds(ratio=ratio, growth=BondGrowth(rest_growth, slip_growth, rest_speed))
     single_step = grow_length(law, initial_length, speed, speed, speed * time, time)[0]
     length = initial_length
     for _ in range(n_substeps):
@@ -59,7 +57,7 @@ def test_always_growth_is_independent_of_substeps(
 
 def test_exact_steady_bond_length_agrees_with_equation():
     """The bond length at constant speed converges to the steady value of equation 2.11."""
-    law = unit_bonds(ratio=0.7, rest_growth=0.4, slip_growth=0.1, rest_speed=1e-6)
+    law = unit_bonds(ratio=0.7, growth=BondGrowth(0.4, 0.1, 1e-6))
     for speed in (0.02, 0.2, 2.0):
         eps = grow_length(law, 1.0, speed, speed, 1e3, 1e3 / speed)[0]
         assert eps == pytest.approx((1 + 0.7 * speed**2 / 0.04) / (1 + speed**2 / 0.04), rel=1e-13)

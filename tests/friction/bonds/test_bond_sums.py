@@ -18,11 +18,11 @@ from friction_paths import (
     upper_pressure,
 )
 
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 
 UNIT_PRESSURE = upper_pressure([1.0])
-GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
-YOUNG = {"ratio": 0.5, "rest_growth": 0.1, "slip_growth": 0.2, "rest_speed": 1e-2}
+GROWTH = {"ratio": 0.6, "growth": BondGrowth(0.3, 0.4, 1e-2)}
+YOUNG = {"ratio": 0.5, "growth": BondGrowth(0.1, 0.2, 1e-2)}
 X = np.linspace(-30, 30, 31)
 WAVES = LowerPressure(X, 1.5 + np.sin(2 * np.pi * X / 7))
 # Places that lose their contact again and again
@@ -138,7 +138,7 @@ def test_exact_virgin_force_agrees_with_closed_form(order, reading, initial, exp
 @pytest.mark.parametrize("order, options", [(0, (0.0, 0.0)), (1, (1e-9, 0.01))])
 def test_exact_loaded_bonds_heal_at_rest(order, options):
     """The force of loaded bonds at rest is 0.5, then 0.81606 and 0.93233 after one and two growth times (check C8)."""
-    law = Bonds(1.0, 1.0, order, "report", 0.5, 10.0, 1e-3, 1.0, 0.0)
+    law = Bonds(1.0, 1.0, order, "report", 0.5, BondGrowth(10.0, 1e-3, 1.0), 0.0)
     path = np.append(40 - np.geomspace(40, 1e-5, 1500), [40 - 1e-5] * 2)
     times = np.append(np.full(1499, 1e-9), [0.1, 0.1])
     force = march_bonds(law, path, UNIT_PRESSURE, times, *options).traction[-3:, 0]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.friction.bonds.parameters import growth_path_ratio
 
 SPEEDS = st.floats(1e-6, 1e2)
@@ -17,8 +17,7 @@ def make_law(metre: float = 1.0, second: float = 1.0, **options) -> Bonds:
         0.3,
         2e-6 * metre,
         ratio=0.4,
-        rest_growth=3e-3 * metre / second**2,
-        slip_growth=5e-6 * metre,
+        growth=BondGrowth(3e-3 * metre / second**2, 5e-6 * metre),
         **options,
     )
 
@@ -44,10 +43,10 @@ def test_exact_path_ratio_grows_with_speed_to_that_of_weakening(speed):
     """The ratio rises with the speed from v^2/(a_s eps_0) towards l_k/eps_k, the ratio without healing."""
     law = make_law()
     ratio, faster = (growth_path_ratio(law, factor * speed) for factor in (1.0, 2.0))
-    limit = law.slip_growth / (law.ratio * law.length)
+    limit = law.growth.slip_growth / (law.ratio * law.length)
     assert 0 < ratio <= faster <= limit * (1 + 1e-12)
     assert growth_path_ratio(law, 1e9) == pytest.approx(limit, rel=1e-9)
-    slow = 1e-7 * np.sqrt(law.rest_growth * law.slip_growth)
+    slow = 1e-7 * np.sqrt(law.growth.rest_growth * law.growth.slip_growth)
     assert growth_path_ratio(law, slow) == pytest.approx(
-        slow**2 / (law.rest_growth * law.length), rel=1e-9
+        slow**2 / (law.growth.rest_growth * law.length), rel=1e-9
     )

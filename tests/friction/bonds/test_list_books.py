@@ -5,7 +5,7 @@ import pytest
 from friction_paths import make_points, upper_pressure
 from march_paths import follow_path
 
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 
 ENGINES = {"direct": (0.0, 0.0), "truncated": (1e-6, 0.0), "merged": (1e-6, 0.02)}  # tail, merge
 CASES = [
@@ -21,7 +21,7 @@ CASES = [
 @pytest.mark.parametrize("reading, order, engine", CASES)
 def test_order_of_list_work_quadrature_is_two(reading, order, engine):
     """The trapezoidal work of the force converges to the work of the step means with order two (1.3 for order -0.5)."""
-    law = Bonds(1.0, 1.0, order, reading, 0.6, 0.3, 0.4, 1e-2, 0.0)
+    law = Bonds(1.0, 1.0, order, reading, 0.6, BondGrowth(0.3, 0.4, 1e-2), 0.0)
     contact = make_points(law, upper_pressure([1.0]), *ENGINES[engine])
     errors = []
     for steps in (100, 400):

@@ -8,10 +8,10 @@ import pytest
 from friction_paths import make_points, random_walk, triangle_path, upper_pressure
 from march_paths import follow_path
 
-from patchfem.friction import Bonds, RequestedEngine, choose_engine
+from patchfem.friction import BondGrowth, Bonds, RequestedEngine, choose_engine
 
 MERGED = RequestedEngine("merged")
-GROWTH = {"ratio": 0.54, "rest_growth": 0.145, "slip_growth": 7.64, "rest_speed": 4.55e-4}
+GROWTH = {"ratio": 0.54, "growth": BondGrowth(0.145, 7.64, 4.55e-4)}
 PHASE = np.arange(6 * 400 + 1) / 400 * 2 * np.pi
 WALK = np.interp(np.arange(481) / 8, np.arange(61), 0.01 * random_walk(1, 60, 0.1))
 
@@ -46,10 +46,11 @@ CASES = {
         0.00536 * (np.exp(-PHASE / 6) * np.sin(PHASE + 1) - np.sin(1)), 400, 2.9e-3,
     ),
     # Bonds that grow at rest shortly after they form: with uniform strips 121.
-    "fast growth": (Bonds(1.0, 1.0, -0.9, "report", 0.5, 0.1, 0.02, 2e-5, 0.0), WALK, 800, 1e-3),
+    "fast growth": (Bonds(1.0, 1.0, -0.9, "report", 0.5, BondGrowth(0.1, 0.02, 2e-5), 0.0), WALK, 800, 1e-3),
     # The bond length falls by three quarters within 0.01: with the weight of merged strips taken as uniform 5.2.
     "shrinking": (
-        Bonds(1.0, 1.0, 0.3, "stretch", 0.24, 0.15, 6.6e-3, 2e-3, 0.0), 0.046 * random_walk(3, 1000, 0.05), 400, 2e-4,
+        Bonds(1.0, 1.0, 0.3, "stretch", 0.24, BondGrowth(0.15, 6.6e-3, 2e-3), 0.0),
+        0.046 * random_walk(3, 1000, 0.05), 400, 2e-4,
     ),
 }  # fmt: skip
 
@@ -82,9 +83,11 @@ def draw_law_path_and_steps(rng):
     if rng.random() >= 0.4:
         growth = {
             "ratio": rng.uniform(0.2, 1),
-            "rest_growth": amplitude * 10 ** rng.uniform(-3, 2),
-            "slip_growth": 10 ** rng.uniform(-2.5, 1),
-            "rest_speed": amplitude * 10 ** rng.uniform(-4, -1),
+            "growth": BondGrowth(
+                amplitude * 10 ** rng.uniform(-3, 2),
+                10 ** rng.uniform(-2.5, 1),
+                amplitude * 10 ** rng.uniform(-4, -1),
+            ),
         }
     initial = float(order >= 0 and rng.random() < 0.5)
     return Bonds(1.0, 1.0, order, reading, initial=initial, **growth), path, steps

@@ -16,7 +16,7 @@ from vibration_forms import sliding_amplitude
 
 from patchfem import build
 from patchfem.core import SineDrive
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.friction.bonds.list_numbers import cutoff_age
 from patchfem.motion_measures import energy_balance
 from patchfem.runs.bench import bench as law_bench
@@ -37,7 +37,7 @@ def test_exact_dwell_of_stretch_law_agrees_with_closed_form(dwell_time):
     Sliding at a high speed leaves bonds of half the length, which grow by 10 exp(-10 t) at rest. The step after the dwell
     is as fast, so that the length decreases over one bond length of slip.
     """
-    law = Bonds(1.0, 1.0, ratio=0.5, rest_growth=10.0, slip_growth=1.0, rest_speed=1.0)
+    law = Bonds(1.0, 1.0, ratio=0.5, growth=BondGrowth(10.0, 1.0, 1.0))
     for x in (0.25, 0.5, 1.0, 2.0):
         path = np.append(np.linspace(0.0, 60.0, 121), [60.0, 60.0 + x])
         times = np.concatenate([np.full(120, 1e-12), [dwell_time, 1e-12]])

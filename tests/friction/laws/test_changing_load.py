@@ -11,11 +11,11 @@ from scipy.integrate import quad
 
 from patchfem import build
 from patchfem.core import Missing
-from patchfem.friction import Bonds
+from patchfem.friction import BondGrowth, Bonds
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import loads
 
-GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 0.01}
+GROWTH = {"ratio": 0.5, "growth": BondGrowth(0.4, 0.3, 0.01)}
 
 
 @pytest.mark.parametrize("order, growth", [(1.0, {}), (1.0, GROWTH), (0.0, {}), (2.0, GROWTH)])

@@ -386,7 +386,7 @@ def test_roughness_in_a_bent_track_is_that_of_the_unworn_surface(shape):
     columns = np.arange(4000)
     weights = np.exp(-(np.pi**2) / np.log(2) * ((columns[:, None] - columns) / cutoff) ** 2)
     rough = unworn - weights @ unworn / weights.sum(axis=1)
-    indices = np.flatnonzero(found.evidence.curves.worn)
+    indices = np.flatnonzero(found.evidence.curves.masks.worn)
     flank = (indices[-1] - indices[0]) // 10 + 80
     part = rough[round(found.evidence.curves.x[0] / UM) + indices[0] :][
         flank : np.ptp(indices) - flank
