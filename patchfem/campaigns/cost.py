@@ -167,18 +167,21 @@ def compute_costs(
     Raises
     ------
     PatchfemError, NotConverged
-        As for `compute_setting_costs`.
+        If the scene does not have this setting; if fewer than three runs succeed, or none at any tolerance.
     """
     names = [over]
     if not over:
         with locate_errors(model.source):
             settings = subject.find_settings(model)
         names = [TOLERANCE_SETTING, *settings[: None if varies_all else 1]]
-    return {name: compute_setting_costs(model, name, say, subject) for name in names}
+    curves = {}
+    for name in names:
+        curves[name] = _compute_setting_costs(model, name, say, subject, is_first=not curves)
+    return curves
 
 
-def compute_setting_costs(
-    model: Model, setting_name: str, say: Callable | None = None, subject: Subject = RUN
+def _compute_setting_costs(
+    model: Model, setting_name: str, say: Callable | None, subject: Subject, *, is_first: bool
 ) -> list[Cost]:
     """Run a model with several values of a numerical setting, from coarse to fine.
 
@@ -188,10 +191,12 @@ def compute_setting_costs(
         Model of the scene with its own settings.
     setting_name : str
         One of NUMERICAL_SETTINGS, or TOLERANCE_SETTING for several tolerances, which include that of the scene.
-    say : callable, optional
+    say : callable or None
         Called with a line of text for each run.
     subject : Subject
         What is computed with each setting.
+    is_first : bool
+        Whether nothing was computed before, so that the first timing would contain imports.
 
     Returns
     -------
@@ -215,6 +220,9 @@ def compute_setting_costs(
             )
         tolerances = subject.tolerances or choose_tolerances(model)
         settings = make_setting_values(model, setting_name, tolerances)
+        # The first run includes imports and compilation, which the timings must not contain.
+        if is_first:
+            _run_setting(settings[0], None, subject)
         runs = _time_settings(settings, say, subject)
     # Smallest number of runs of a curve over a setting
     if not runs or (len(runs) < 3 and setting_name != TOLERANCE_SETTING):
@@ -229,9 +237,6 @@ def _time_settings(settings: list[Setting], say: Callable | None, subject: Subje
 
     `say`, if given, is called with a line of text that reports the progress, and `subject` says what is computed.
     """
-    # The first run includes imports and compilation, which the timings must not contain.
-    _run_setting(settings[0], None, subject)
-
     runs = []
     for setting in settings:
         # a short run is timed several times, and one that compiles once more

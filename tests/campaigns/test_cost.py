@@ -261,7 +261,7 @@ def test_exact_cost_of_backbone_has_values_of_backbone(monkeypatch):
     ends = np.array([4e-7, 1e-3])
     monkeypatch.setattr(backbone_cost, "TOLERANCES", (1e-3,))
     monkeypatch.setattr(backbone_cost, "N_AMPLITUDES", 2)
-    monkeypatch.setattr(backbone_cost, "default_amplitudes", lambda _: ends)
+    monkeypatch.setattr(backbone_cost, "find_default_range", lambda _: ends)
     text = POINT + IWAN + STRUCTURE.partition("[drive]")[0]
     answer = pf.cost(text, backbone=True, say=lambda line: None)
     (run_of_curve,) = answer["tolerance"]["runs"]
