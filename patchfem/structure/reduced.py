@@ -327,7 +327,9 @@ def _compute_free_interface_shapes(
         factor = _factorize((K + shift * M).tocsc()) if shift else None
     if factor is None:
         raise PatchfemError(
-            "a part of the structure has neither stiffness nor mass", "structure.reduced.stiffness"
+            "a part of the structure has neither stiffness nor mass; "
+            "leave out its coordinates, or connect them",
+            "structure.reduced.stiffness",
         )
 
     # The attachment modes take the place of as many modes.

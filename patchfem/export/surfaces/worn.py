@@ -65,7 +65,10 @@ def read_patch(folder: Path) -> PatchRun:
     data = answer.data
     scene = tomllib.loads(answer.origin.get("resolved", ""))
     if "contact" not in scene:
-        raise PatchfemError(f"{folder}: a run without [contact] has no surfaces to compare")
+        raise PatchfemError(
+            f"{folder}: a run without [contact] has no surfaces to compare; "
+            "give a run with [contact] and [wear]"
+        )
     missing = [name for name in REQUIRED_VARIABLES if name not in data]
     if missing:
         raise PatchfemError(
@@ -82,7 +85,9 @@ def read_patch(folder: Path) -> PatchRun:
     try:
         area, gap, depth = (np.broadcast_to(field, shape) for field in fields)
     except ValueError:
-        raise PatchfemError(f"{folder}: the fields in result.nc differ in length") from None
+        raise PatchfemError(
+            f"{folder}: the fields in result.nc differ in length; run the scene again"
+        ) from None
 
     # Measures of the wear with their errors, as far as the run has them.
     measures = {
