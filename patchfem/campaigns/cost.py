@@ -227,7 +227,8 @@ def _compute_setting_costs(
     # Smallest number of runs of a curve over a setting
     if not runs or (len(runs) < 3 and setting_name != TOLERANCE_SETTING):
         raise NotConverged(
-            f"cost --over {setting_name}: runs with only {len(runs)} values of it succeeded"
+            f"cost --over {setting_name}: runs with only {len(runs)} values of it succeeded, and three are needed; set it "
+            "in the scene to a value with which the scene runs"
         )
     return runs
 
@@ -401,6 +402,6 @@ def describe_best_setting(runs: list[Cost], tolerance: float) -> str:
     if not worst.is_complete:
         return f"no setting is known to meet the tolerance {tolerance:g}: no run has an error estimate of every measure"
     return (
-        f"no setting is known to meet the tolerance {tolerance:g}: the best run, with {best.words}, has an error of "
+        f"no setting is known to meet the tolerance {tolerance:g}: the best run, with {best.words}, has a relative error of "
         f"{format_number(worst.fraction, 2)} in {worst.name} and takes {seconds} CPU s"
     )

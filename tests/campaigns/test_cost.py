@@ -86,8 +86,8 @@ def test_exact_summary_states_coarsest_sufficient_run_or_worst_measure():
     within = "a knob at 4: 2 CPU s per run, with every measure that has an error estimate within the tolerance 0.01"
     assert describe_best_setting(runs, 1e-2) == within
     assert describe_best_setting(runs, 1e-3) == (
-        "no setting is known to meet the tolerance 0.001: the best run, with a knob at 8, has an error of 0.002 in a and "
-        "takes 5 CPU s"
+        "no setting is known to meet the tolerance 0.001: the best run, with a knob at 8, has a relative error of "
+        "0.002 in a and takes 5 CPU s"
     )
     # a coarse run that is accurate by chance does not count
     assert describe_best_setting([make_cost("1", 0.5, 1e-4), *runs], 1e-2) == within
