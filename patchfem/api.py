@@ -427,7 +427,7 @@ def cost(
     over : str, optional
         Only setting to vary: "element_size", "cells", "steps_per_cycle", "shear_modes" or "jumps".
     backbone : bool, optional
-        Measure the backbone of the first mode at five amplitudes, in place of the run of the scene.
+        Measure the backbone of the first mode at up to five amplitudes, in place of the run of the scene.
     out : path, optional
         Folder for cost.csv and the page. Default: no files are written.
     say : callable, optional
