@@ -87,29 +87,28 @@ def _make_axis_layout(axis, columns) -> Figure:
         values = values[np.isfinite(values) & (values > 0)]
         # Round-off beside large values would stretch the axis over many decades.
         is_known = values > VALUE_ROUND_OFF * values.max(initial=0.0)
-        values, unknown = values[is_known], values[~is_known]
         if values.size:
-            layout |= _make_log_labels(*np.log10([values.min(), values.max()]), unknown.size > 0)
+            low, high = np.log10([values[is_known].min(), values.max()])
+            layout |= _make_log_labels(low, high)
+            if not is_known.all():
+                room = 0.05 * (high - low) + 0.02
+                layout["range"] = [low - room, high + room]
     return layout
 
 
-def _make_log_labels(low: float, high: float, has_range: bool) -> Figure:
-    """Return the labels of a logarithmic axis from `low` to `high`, in decades, and its range if it `has_range`.
+def _make_log_labels(low: float, high: float) -> Figure:
+    """Return the labels of a logarithmic axis from `low` to `high`, both logarithms.
 
     By default plotly.js writes 20 as a small 2 beside 10, and the labels of many decades overlap.
     """
-    layout = {}
-    if has_range:
-        room = 0.05 * (high - low) + 0.02
-        layout["range"] = [low - room, high + room]
     if not MIN_LABELLED_DECADES < high - low < MAX_LABELLED_DECADES:
-        return layout
+        return {}
     digits = next((digits for room, digits in LABELLED_DIGITS.items() if high - low < room), ())
     if not digits:
-        return layout | {"dtick": 1}
-    powers = range(int(np.floor(low)) - 1, int(np.ceil(high)) + 2)
-    labels = [digit * 10.0**power for power in powers for digit in digits]
-    return layout | {"tickvals": labels, "ticktext": [format_number(one, 2) for one in labels]}
+        return {"dtick": 1}
+    powers = 10.0 ** np.arange(np.floor(low), high + 1)
+    labels = np.outer(powers, digits).ravel().tolist()
+    return {"tickvals": labels, "ticktext": [format_number(one, 2) for one in labels]}
 
 
 def _make_vertical_line(position: float) -> Figure:
