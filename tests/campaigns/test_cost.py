@@ -273,3 +273,18 @@ def test_exact_cost_of_backbone_has_values_of_backbone(monkeypatch):
             assert run_of_curve["values"][found] == pytest.approx(value, rel=1e-9)
             assert run_of_curve["errors"][found] == pytest.approx(error, rel=1e-9)
     assert run_of_curve["meets_tolerance"]
+
+
+def test_exact_cost_of_backbone_leaves_out_amplitudes_without_a_motion(monkeypatch):
+    """Amplitudes at which the mode does not oscillate are not looked for again in every run; the note lists the others."""
+    monkeypatch.setattr(backbone_cost, "N_AMPLITUDES", 3)
+    monkeypatch.setattr(backbone_cost, "find_default_range", lambda _: (1e-5, 3e-5))
+    law = {"friction.law": "elastic-plastic", "friction.bond_length": "1 um"}
+    model = pf.build(pf.new("rig"), **law)
+    subject = backbone_cost.make_backbone_subject(model)
+    assert "at these amplitudes: 10 um, 30 um." in subject.notes[0]
+    measures = subject.solve(model).measures
+    curves = pf.backbone(model, amplitudes=[1e-5, 3e-5], method="balance")
+    for k, place in enumerate(("smallest", "largest")):
+        found = measures[f"frequency_at_{place}_amplitude"].value
+        assert found == pytest.approx(curves["balance_frequency"].values[k], rel=1e-12)
