@@ -400,7 +400,10 @@ def describe_best_setting(runs: list[Cost], tolerance: float) -> str:
         )
         return f"{best.words}: {seconds} CPU s per run, with every {judged} within the tolerance {tolerance:g}"
     if not worst.is_complete:
-        return f"no setting is known to meet the tolerance {tolerance:g}: no run has an error estimate of every measure"
+        return (
+            f"no setting is known to meet the tolerance {tolerance:g}: no run has an error estimate of every measure; "
+            "compare the values of the finest runs"
+        )
     return (
         f"no setting is known to meet the tolerance {tolerance:g}: the best run, with {best.words}, has a relative error of "
         f"{format_number(worst.fraction, 2)} in {worst.name} and takes {seconds} CPU s"

@@ -130,7 +130,7 @@ def _describe_missing_samples(time: np.ndarray, middle: float, length: float) ->
         return ""
     return (
         f"the half cycle from {low:.4g} s to {high:.4g} s has {count} samples, and at least {MIN_HALF_CYCLE_SAMPLES} "
-        "are needed"
+        "are needed: use a higher sampling rate"
     )
 
 
