@@ -341,10 +341,9 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     # a colour for each varied setting and for runs that miss the tolerance
     texts = [row.judgement for row in rows]
     if rows[0].knob != rows[-1].knob:
-        texts = [
-            f"{row.knob.replace('_', ' ')}: {row.judgement.removesuffix(' its tolerance')}"
-            for row in rows
-        ]
+        words = [text.removesuffix(" its tolerance") for text in texts]
+        knobs = [row.knob.replace("_", " ") for row in rows]
+        texts = [f"{knob}: {word}" for knob, word in zip(knobs, words, strict=True)]
     data["result"] = encode_texts("run", texts)
     return data
 
