@@ -427,7 +427,7 @@ def cost(
     over : str, optional
         Only setting to vary: "element_size", "cells", "steps_per_cycle", "shear_modes" or "jumps".
     backbone : bool, optional
-        Measure the backbone of the first mode at five amplitudes, in place of the run of the scene.
+        Measure the backbone of the first mode at up to five amplitudes, in place of the run of the scene.
     out : path, optional
         Folder for cost.csv and the page. Default: no files are written.
     say : callable, optional
@@ -460,13 +460,8 @@ def cost(
     >>> coarsest["label"], coarsest["meets_tolerance"]
     ('200', True)
     """
-
-    def build_with(tables: BackboneTables, _) -> Model:
-        """Build the model of the scene with the tables of a backbone."""
-        return build_model(_load_and_prepare(scene, tables, sets))
-
-    if backbone and not isinstance(scene, Model):
-        model = given_modes.prepare_model(build_with, "", ()).model
+    if backbone:
+        model = given_modes.prepare_model(_make_backbone_builder(scene, sets), "", ()).model
     else:
         model = build(scene, **sets)
     subject = backbone_cost.make_backbone_subject(model) if backbone else cost_curves.RUN
@@ -558,22 +553,6 @@ def backbone(
     >>> curves["quasi_static_frequency"].size
     5
     """
-
-    def build_with(tables: BackboneTables, sets: tuple[str, ...] | None) -> Model:
-        """Build the model of the scene with the tables of a backbone.
-
-        `sets` are `key=value` strings of a case. None stands for the scene as written, without other values.
-        """
-        if isinstance(scene, Model):
-            return build(scene, **changes)
-        if sets is None:
-            written = replace(scene, sets=()) if isinstance(scene, Scene) else scene
-            return build_model(_load_and_prepare(written, tables, {}))
-        values = changes | dict(text.split("=", 1) for text in sets)
-        return build_model(_load_and_prepare(scene, tables, values))
-
-    # `build_with` has its own `sets`, those of a value of `over`
-    changes = sets
     if not isinstance(modes, str) and isinstance(modes, Iterable):
         # an iterator can be read only once, but each value of `over` has the same modes
         modes = list(modes)
@@ -601,7 +580,29 @@ def backbone(
         modes,
         "".join(f"{key}={format_values(key, values)}" for key, values in (over or {}).items()),
     )
-    return netcdf.to_dataset(backbones.compute_answer(build_with, request))
+    return netcdf.to_dataset(backbones.compute_answer(_make_backbone_builder(scene, sets), request))
+
+
+def _make_backbone_builder(scene, changes: Mapping[str, Any]) -> Callable[..., Model]:
+    """Return the function that builds the model of a scene with the tables of a backbone.
+
+    `scene` and `changes`, keys with new values, are as for `load`. A Model is built already.
+    """
+
+    def build_with(tables: BackboneTables, sets: tuple[str, ...] | None) -> Model:
+        """Build the model of the scene with the tables of a backbone.
+
+        `sets` are `key=value` strings of a case. None stands for the scene as written, without other values.
+        """
+        if isinstance(scene, Model):
+            return build(scene, **changes)
+        if sets is None:
+            written = replace(scene, sets=()) if isinstance(scene, Scene) else scene
+            return build_model(_load_and_prepare(written, tables, {}))
+        values = {**changes, **dict(text.split("=", 1) for text in sets)}
+        return build_model(_load_and_prepare(scene, tables, values))
+
+    return build_with
 
 
 @_make_verb

@@ -90,6 +90,7 @@ def import_shapes(folder: Path) -> None:
 
 
 COMMANDS = {  # removed option -> (command that uses it, replacement that the message names)
+    "run --fresh": ("run a.toml --fresh", "leave it out: every run computes"),
     "fit --placebo": (
         "fit a.toml --placebo friction.static=0.3",
         "set another value of the key with --set",

@@ -167,18 +167,21 @@ def compute_costs(
     Raises
     ------
     PatchfemError, NotConverged
-        As for `compute_setting_costs`.
+        If the scene does not have this setting; if fewer than three runs succeed, or none at any tolerance.
     """
     names = [over]
     if not over:
         with locate_errors(model.source):
             settings = subject.find_settings(model)
         names = [TOLERANCE_SETTING, *settings[: None if varies_all else 1]]
-    return {name: compute_setting_costs(model, name, say, subject) for name in names}
+    curves = {}
+    for name in names:
+        curves[name] = _compute_setting_costs(model, name, say, subject, is_first=not curves)
+    return curves
 
 
-def compute_setting_costs(
-    model: Model, setting_name: str, say: Callable | None = None, subject: Subject = RUN
+def _compute_setting_costs(
+    model: Model, setting_name: str, say: Callable | None, subject: Subject, *, is_first: bool
 ) -> list[Cost]:
     """Run a model with several values of a numerical setting, from coarse to fine.
 
@@ -188,10 +191,12 @@ def compute_setting_costs(
         Model of the scene with its own settings.
     setting_name : str
         One of NUMERICAL_SETTINGS, or TOLERANCE_SETTING for several tolerances, which include that of the scene.
-    say : callable, optional
+    say : callable or None
         Called with a line of text for each run.
     subject : Subject
         What is computed with each setting.
+    is_first : bool
+        Whether nothing was computed before, so that the first timing would contain imports.
 
     Returns
     -------
@@ -215,11 +220,15 @@ def compute_setting_costs(
             )
         tolerances = subject.tolerances or choose_tolerances(model)
         settings = make_setting_values(model, setting_name, tolerances)
+        # The first run includes imports and compilation, which the timings must not contain.
+        if is_first:
+            _run_setting(settings[0], None, subject)
         runs = _time_settings(settings, say, subject)
     # Smallest number of runs of a curve over a setting
     if not runs or (len(runs) < 3 and setting_name != TOLERANCE_SETTING):
         raise NotConverged(
-            f"cost --over {setting_name}: runs with only {len(runs)} values of it succeeded"
+            f"cost --over {setting_name}: runs with only {len(runs)} values of it succeeded, and three are needed; set it "
+            "in the scene to a value with which the scene runs"
         )
     return runs
 
@@ -229,9 +238,6 @@ def _time_settings(settings: list[Setting], say: Callable | None, subject: Subje
 
     `say`, if given, is called with a line of text that reports the progress, and `subject` says what is computed.
     """
-    # The first run includes imports and compilation, which the timings must not contain.
-    _run_setting(settings[0], None, subject)
-
     runs = []
     for setting in settings:
         # a short run is timed several times, and one that compiles once more
@@ -394,8 +400,11 @@ def describe_best_setting(runs: list[Cost], tolerance: float) -> str:
         )
         return f"{best.words}: {seconds} CPU s per run, with every {judged} within the tolerance {tolerance:g}"
     if not worst.is_complete:
-        return f"no setting is known to meet the tolerance {tolerance:g}: no run has an error estimate of every measure"
+        return (
+            f"no setting is known to meet the tolerance {tolerance:g}: no run has an error estimate of every measure; "
+            "compare the values of the finest runs"
+        )
     return (
-        f"no setting is known to meet the tolerance {tolerance:g}: the best run, with {best.words}, has an error of "
+        f"no setting is known to meet the tolerance {tolerance:g}: the best run, with {best.words}, has a relative error of "
         f"{format_number(worst.fraction, 2)} in {worst.name} and takes {seconds} CPU s"
     )

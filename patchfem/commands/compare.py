@@ -154,7 +154,8 @@ def _compare_in_scene(
     scene, sets = base
     if load_scene(scene, sets).contact is None:
         raise UsageError(
-            f"compare --scene {scene}: the scene has no [contact], so it has no patch to press"
+            f"compare --scene {scene}: the scene has no [contact], so it has no patch to press; "
+            "give the scene of a patch"
         )
 
     def run_surfaces(*paths: Path):

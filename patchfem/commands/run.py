@@ -6,7 +6,6 @@ from pathlib import Path
 from .. import core
 from ..export import run_folder, store
 from ..runs import plan
-from ..runs.patch.store import clear_cache
 from .shared import (
     DEFAULT_OUTPUT,
     NOT_CONVERGED_EXIT_CODE,
@@ -31,9 +30,6 @@ def run(
     resume: flag_option(
         "continue an interrupted run; possible with [wear] and for a run that is integrated in time"
     ) = False,
-    fresh: flag_option(
-        "compute the stiffness of the pieces again instead of taking it from the cache"
-    ) = False,
     output_options: OutputGroup = DEFAULT_OUTPUT,
 ):
     """Run SCENE and write its results folder, by default out/<scene name>.
@@ -54,8 +50,6 @@ def run(
         _report_complete_run(target, output)
         return
 
-    if fresh:
-        clear_cache()
     report = None if output.quiet else print_message
     with Progress(output.quiet or output.json_) as progress:
         written = run_folder.run_into(

@@ -40,7 +40,7 @@ def cost(
         "table, such as contact.element_size"
     ) = "",
     of_backbone: flag_option(
-        "measure the backbone of the first mode at five amplitudes, in place of the run of SCENE",
+        "measure the backbone of the first mode at up to five amplitudes, in place of the run of SCENE",
         "--backbone",
     ) = False,
     set_: Sets = (),

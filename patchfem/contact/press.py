@@ -224,5 +224,6 @@ def _refuse_unsolvable(x: np.ndarray, gap: np.ndarray, holder: Holders) -> None:
         if not abs(load_line - (x[0] + x[-1]) / 2) < half_length:
             raise PatchfemError(
                 f"contact.load_line: the load line lies {load_line:.6g} m from the middle, outside the half length "
-                f"{half_length:.6g} m: the piece tips over"
+                f"{half_length:.6g} m: the piece tips over; "
+                "move the load line towards the middle"
             )

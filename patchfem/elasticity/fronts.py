@@ -335,5 +335,8 @@ def _factorise(matrix) -> tuple[np.ndarray, float]:
     diagonal = matrix.diagonal().copy()
     factor, fault = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
     if fault:
-        raise NotConverged("the stiffness of the piece is not positive definite")
+        raise NotConverged(
+            "the stiffness of the piece is not positive definite; "
+            "check the elastic constants and the cells of the mesh"
+        )
     return factor, float((factor.diagonal() ** 2 / diagonal).min())

@@ -48,7 +48,10 @@ class SparseFactor:
         column = np.argsort(self.factor.perm_c)
         ratio = self.factor.U.diagonal() / diagonal[column]
         if (ratio < -min_pivot).any():
-            raise NotConverged("the stiffness is not positive definite")
+            raise NotConverged(
+                "the stiffness is not positive definite; "
+                "check the elastic constants and the cells of the mesh"
+            )
         if (ratio <= min_pivot).any():
             raise ZeroEnergyMotion("the stiffness has a motion without energy")
 

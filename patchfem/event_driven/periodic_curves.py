@@ -398,7 +398,8 @@ class MotionCurve(ExtendedShooting):
         first = self._find_crossing(w, PathPoint(w, None, self.state, None))
         if first is None:
             raise NotConverged(
-                "accuracy.method: the first point of the curve was not found near the given start"
+                "accuracy.method: the first point of the curve was not found near the given start; "
+                'use accuracy.method = "march"'
             )
         points = [first]
         unit = np.full(w.size, float(np.linalg.norm(w[:-1])) or 1.0)

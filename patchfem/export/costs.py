@@ -339,8 +339,11 @@ def _make_data(rows: list[Row], main: str) -> Variables:
     data |= {"main_measure": data[main], "main_measure_error": data[f"error_{main}"]}
 
     # a colour for each varied setting and for runs that miss the tolerance
-    has_several = rows[0].knob != rows[-1].knob
-    texts = [f"{row.knob.replace('_', ' ')}: " * has_several + row.judgement for row in rows]
+    texts = [row.judgement for row in rows]
+    if rows[0].knob != rows[-1].knob:
+        words = [text.removesuffix(" its tolerance") for text in texts]
+        knobs = [row.knob.replace("_", " ") for row in rows]
+        texts = [f"{knob}: {word}" for knob, word in zip(knobs, words, strict=True)]
     data["result"] = encode_texts("run", texts)
     return data
 

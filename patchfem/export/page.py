@@ -117,7 +117,10 @@ def read_answers(folders: list[Path]) -> Answers:
         answers[f"{name} ({len(answers) + 1})" if name in answers else name] = answer
     if len({"run" if answer.is_run else answer.kind for answer in answers.values()}) > 1:
         kinds = ", ".join(f"{name}: {answer.kind}" for name, answer in answers.items())
-        raise PatchfemError(f"report: the folders have results of different kinds ({kinds})")
+        raise PatchfemError(
+            f"report: the folders have results of different kinds ({kinds}); "
+            "give folders of one kind"
+        )
     return _sort_by_drive_level(answers)
 
 

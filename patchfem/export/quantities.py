@@ -47,6 +47,8 @@ KEY_QUANTITY_NAMES = tuple(
 
 # kinds of answers whose quantities are defined in `surface_definitions`
 SURFACE_ANSWER_KINDS = ("compare", "pairs", "profile")
+# Ratio of the ends of an interval above which one unit does not suit both
+MAX_END_RATIO = 10.0
 FIT_KEY_TEXT = (
     "value of this key of the scene that fits the measurement best, with its 95 % interval"
 )
@@ -128,6 +130,13 @@ def format_quantity(name: str, quantity: Quantity) -> str:
         return "-"
     error = quantity.error
     ends = [abs(end) for end in (quantity.low, quantity.high) if end is not None]
+    if error is None and len(ends) == 2 and quantity.high > MAX_END_RATIO * quantity.low > 0:
+        # each number in its own unit: the digits of the largest one would hide the others
+        numbers = (value, quantity.low, quantity.high)
+        text, *ends = (format_value(number, quantity.unit, 3, name) for number in numbers)
+        if len({one.partition(" ")[2] for one in (text, *ends)}) == 1:
+            ends = [end.partition(" ")[0] for end in ends]
+        return f"{text} ({' to '.join(ends)})"
     unit, scale = choose_scale(name, quantity.unit, max([abs(value), *ends]))
     digits = None if error is not None or ends else _find_digits(name)
     if digits is not None:

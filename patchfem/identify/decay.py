@@ -38,7 +38,9 @@ def fit_decay(time, value) -> FittedModes:
     limits = Limits(count=8, decrease=0.36, spacing=spacing)
     fit = problem.fit(lambda fit: _find_starts(time, fit), limits)
     if not fit.poles.size:
-        raise PatchfemError("the record contains no decaying oscillation")
+        raise PatchfemError(
+            "the record contains no decaying oscillation; give the record of a free decay"
+        )
 
     # sinusoids that decay, and whose energy counts
     motions = np.einsum("nkc,nc->nk", problem.tabulate(fit.poles)[:, 0], fit.coefficients)

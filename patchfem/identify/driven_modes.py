@@ -126,10 +126,14 @@ def fit_driven_modes(
     """
     if force.size < MIN_RECORD_SAMPLES:
         raise PatchfemError(
-            f"the record has {force.size} samples; at least {MIN_RECORD_SAMPLES} are needed"
+            f"the record has {force.size} samples; at least {MIN_RECORD_SAMPLES} are needed; "
+            "record it longer, or with a higher sampling rate"
         )
     if not np.any(force):
-        raise PatchfemError("the input is zero, so there is no response to it")
+        raise PatchfemError(
+            "the input is zero, so there is no response to it; "
+            "map the channel of the input with --map"
+        )
     fitted = slice(MAX_FITTED_SAMPLES)
     record = _DrivenRecord(step, force[fitted], response[fitted], DERIVATIVE_ORDERS[quantity])
     problem = record.problem
@@ -155,6 +159,7 @@ def fit_driven_modes(
     is_kept = (w >= min_w) & (w <= max_w) & is_resonance
     if not is_kept.any():
         raise PatchfemError(
-            f"no mode is visible in the response between {min_frequency:g} and {max_frequency:g} Hz"
+            f"no mode is visible in the response between {min_frequency:g} and {max_frequency:g} Hz; "
+            "give another --band"
         )
     return problem.select_modes(fit, is_kept)

@@ -71,7 +71,8 @@ def find_half_cycles(time, value) -> HalfCycles:
     """
     if time.size < 4 * MIN_HALF_CYCLE_SAMPLES:
         raise PatchfemError(
-            f"the free decay has {time.size} samples; at least {4 * MIN_HALF_CYCLE_SAMPLES} are needed"
+            f"the free decay has {time.size} samples; at least {4 * MIN_HALF_CYCLE_SAMPLES} are needed; "
+            "record it longer, or with a higher sampling rate"
         )
 
     middle, length = _find_first_half_cycle(time, value)
@@ -126,7 +127,7 @@ def _describe_missing_samples(time: np.ndarray, middle: float, length: float) ->
         return ""
     return (
         f"the half cycle from {low:.4g} s to {high:.4g} s has {count} samples, and at least {MIN_HALF_CYCLE_SAMPLES} "
-        "are needed"
+        "are needed: use a higher sampling rate"
     )
 
 
@@ -143,7 +144,7 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     spectrum[:PADDING_FACTOR] = 0.0
     frequency = np.argmax(spectrum) / (PADDING_FACTOR * n * step)
     if not frequency > 0 or not np.ptp(value) > 0:
-        raise PatchfemError("the record contains no oscillation")
+        raise PatchfemError("the record contains no oscillation; give the record of a free decay")
 
     # a sinusoid that is fitted to the first cycle, and a little more for an inexact frequency
     is_first = time - time[0] <= N_CYCLES_OF_FIRST_SINE / frequency
@@ -151,7 +152,8 @@ def _find_first_half_cycle(time, value) -> tuple[float, float]:
     if n_samples < 2 * MIN_HALF_CYCLE_SAMPLES:
         raise PatchfemError(
             f"the record has {n_samples} samples per cycle of {frequency:.4g} Hz; at least "
-            f"{2 * MIN_HALF_CYCLE_SAMPLES} are needed"
+            f"{2 * MIN_HALF_CYCLE_SAMPLES} are needed; "
+            "record it longer, or with a higher sampling rate"
         )
     omega = 2 * np.pi * frequency
     # Bounds of the frequency of the first cycle; its decay rate is free

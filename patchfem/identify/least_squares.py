@@ -141,7 +141,10 @@ class Problem:
         starts = self._choose_starts(max_descents)
         n = starts[0].size
         if model.rows < n:
-            raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
+            raise ValueError(
+                f"{model.rows} rows of data cannot determine {n} values; "
+                "free fewer keys, or give more data"
+            )
 
         ends: list[Descent] = []
         for start in starts:

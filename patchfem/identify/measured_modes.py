@@ -250,7 +250,8 @@ def compute_decay_curve(
             )
         notes.append(
             f"{np.count_nonzero(~is_certain)} of {is_certain.size} amplitudes are left out: the interval "
-            f"of the damping ratio is wider than {MAX_ZETA_ERROR_RATIO:g} times its value there"
+            f"of the damping ratio is wider than {MAX_ZETA_ERROR_RATIO:g} times its value there; "
+            "more samples per cycle or less noise make it narrower"
         )
         curve = curve.select(is_certain)
 

@@ -236,7 +236,8 @@ def _check_values(path, values: dict[str, np.ndarray]) -> None:
         wrong = np.flatnonzero(~np.isfinite(column))
         if wrong.size:
             raise PatchfemError(
-                f"{path}: {name} of sample {wrong[0] + 1} is {column[wrong[0]]}, not a finite number"
+                f"{path}: {name} of sample {wrong[0] + 1} is {column[wrong[0]]}, not a finite number; "
+                "correct it, or remove the sample"
             )
 
     if "time" in values:

@@ -114,7 +114,7 @@ def split_cells(location: str, line: str, separator: str) -> list[str]:
             cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     except csv.Error as error:
         raise PatchfemError(
-            f"{location}: the quotation marks in this row cannot be read ({error})"
+            f"{location}: the quotation marks in this row cannot be read ({error}); close each of them"
         ) from None
     return [cell.strip() for cell in cells]
 

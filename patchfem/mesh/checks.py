@@ -155,12 +155,13 @@ def _check_numbers(mesh: TaggedMesh) -> None:
     wrong_nodes = nodes[(nodes < 0) | (nodes >= n_points)]
     if wrong_nodes.size:
         raise PatchfemError(
-            f"a cell names node {wrong_nodes[0]}, but the file has {n_points} nodes"
+            f"a cell names node {wrong_nodes[0]}, but the file has {n_points} nodes; "
+            "write the mesh again"
         )
     used_points = mesh.points[nodes]
     # Squares of larger coordinates overflow.
     if not np.abs(used_points).max() < 1e150:
-        raise PatchfemError("a node has a coordinate that is not finite")
+        raise PatchfemError("a node has a coordinate that is not finite; write the mesh again")
     span = np.ptp(used_points, axis=0)
     z_span = span[-1]
     if span.size > 2 and z_span > EQUAL_LENGTH_TOL * span[:2].max():
@@ -186,7 +187,8 @@ def _build_piece(mesh: TaggedMesh, side: str) -> PieceMesh:
         is_coating.append(names == f"{side}_coating")
     if len({ELEMENTS[kind].is_quadratic for kind in blocks}) > 1:
         raise PatchfemError(
-            f"the {side} piece has elements of first and of second order, which do not fit together"
+            f"the {side} piece has elements of first and of second order, which do not fit together; "
+            "use elements of one order in each piece"
         )
 
     # The nodes of the interface and of the far face, numbered within the piece
@@ -340,7 +342,9 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
     border = edges.ends[edges.is_border]
     _check_touching_nodes(mesh, border, side)
     if len(np.unique(edges.ends, axis=0)) < len(edges.ends):
-        raise PatchfemError(f"cells of the {side} piece overlap")
+        raise PatchfemError(
+            f"cells of the {side} piece overlap; mesh the piece again, or remove double cells"
+        )
 
     # Cells that share an edge are linked; all of them must form one component
     n_cells = mesh.is_coating.size
@@ -348,7 +352,10 @@ def _check_connections(mesh: PieceMesh, side: str) -> None:
     links = coo_array((np.ones(edges.owner.size), (edges.owner, edges.twin)), shape=shape)
     n_parts, _ = connected_components(links @ links.T, directed=False)
     if n_parts > 1:
-        raise PatchfemError(f"the {side} piece falls into {n_parts} parts that share no edge")
+        raise PatchfemError(
+            f"the {side} piece falls into {n_parts} parts that share no edge; "
+            "merge the nodes of the parts, or leave parts out"
+        )
 
     on_border = np.concatenate([border.ravel(), edges.middles[edges.is_border]])
     n_inside = np.setdiff1d(mesh.far, on_border).size

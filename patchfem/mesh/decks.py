@@ -171,7 +171,7 @@ def _add_numbered(contents: dict[int, object], entries: list, name: str) -> list
     """
     for number, content in entries:
         if number in contents:
-            raise PatchfemError(f"{name} {number} is given twice")
+            raise PatchfemError(f"{name} {number} is given twice; number each once")
         contents[number] = content
     return [number for number, _ in entries]
 

@@ -139,7 +139,8 @@ def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
         raise PatchfemError(f"{path}: no such mesh file")
     if path.stat().st_size > MAX_FILE_BYTES:
         raise PatchfemError(
-            f"{path}: more than {MAX_FILE_BYTES >> 20} MiB; a mesh of two plane pieces is smaller"
+            f"{path}: more than {MAX_FILE_BYTES >> 20} MiB; a mesh of two plane pieces is smaller; "
+            "give a mesh in the plane, or coarser elements"
         )
 
     # Decks have a reader of their own; meshio reads the other formats

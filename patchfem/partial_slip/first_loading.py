@@ -142,7 +142,10 @@ def find_first_loading(compliance: CellCompliance, limit: np.ndarray) -> FirstLo
     """
     is_closed = limit > 0
     if not is_closed.any():
-        raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
+        raise PatchfemError(
+            "contact.shear: the friction limit is 0 at every point of the contact; "
+            "raise friction.static or the load, or leave out [contact.shear]"
+        )
     gross_slip = float(compliance.product(limit)[is_closed].max())
     n_levels = max(limit.shape) // CELLS_PER_LEVEL
     # Those of a grid of 32 cells are the fewest

@@ -134,7 +134,10 @@ def make_jenkins_set(
     """
     yield_force = np.asarray(yield_force, float)
     if not (yield_force > 0).any():
-        raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
+        raise PatchfemError(
+            "contact.shear: the friction limit is 0 at every point of the contact; "
+            "raise friction.static or the load, or leave out [contact.shear]"
+        )
     points = np.flatnonzero(yield_force > 0)
     force = yield_force[points]
     if local_length == 0 and np.ptp(tangential) == 0:

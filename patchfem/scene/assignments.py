@@ -404,7 +404,10 @@ class _ValueReader:
             factor = quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)]
         ends = tuple(_round_digits(end / factor) for end in (low, high))
         if ends[0] == ends[1]:
-            raise ValueError(f"{first}..{last}: both ends are the same value")
+            raise ValueError(
+                f"{first}..{last}: both ends are the same value; "
+                "give different ends, or a single value"
+            )
         is_log = _is_log(*ends, spacing)
         return Range(self.key, low, high, kind, ends, unit, int(count or 0), is_log)
 

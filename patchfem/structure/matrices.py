@@ -251,7 +251,8 @@ def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
     matrix = symmetrize(matrix, f"{name}")
     if shape is not None and matrix.shape != shape:
         raise PatchfemError(
-            f"{name} is {matrix.shape[0]} x {matrix.shape[0]} but M is {shape[0]} x {shape[0]}"
+            f"{name} is {matrix.shape[0]} x {matrix.shape[0]} but M is {shape[0]} x {shape[0]}; "
+            "give matrices of the same coordinates"
         )
     return matrix
 

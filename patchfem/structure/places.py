@@ -157,5 +157,5 @@ def note_missing_mass(basis: ModalBasis) -> list[str]:
         return []
     return [
         f"the modes of structure.file contain {100 * mass_fraction:.0f} % of structure.moving_mass at base_at; the base "
-        "motion does not drive the rest of this mass"
+        "motion does not drive the rest of this mass; add the modes that move it"
     ]

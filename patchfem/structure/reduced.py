@@ -29,6 +29,8 @@ PROJECTION_TOL = 64 * np.finfo(float).eps
 # Smallest squared frequency of an elastic mode, relative to the largest one and per coordinate; a
 # smaller one belongs to a rigid motion
 MIN_ELASTIC_FREQUENCY_FRACTION = 1e-12
+# Advice for a matrix that is not positive semidefinite
+CHECK_EXPORT = "check its signs, and write it with all its digits"
 # Name of the method with fixed-interface modes
 CRAIG_BAMPTON = "craig-bampton"
 
@@ -182,7 +184,7 @@ def _refuse_indefinite(matrix, name: str) -> None:
         k = int(np.argmin(diagonal))
         raise PatchfemError(
             f"the {name} matrix is not positive semidefinite: the diagonal entry of coordinate {k + 1} "
-            f"is {diagonal[k]:.4g}",
+            f"is {diagonal[k]:.4g}; {CHECK_EXPORT}",
             f"structure.reduced.{name}",
         )
     entries = matrix.tocoo()
@@ -193,7 +195,7 @@ def _refuse_indefinite(matrix, name: str) -> None:
         raise PatchfemError(
             f"the {name} matrix is not positive semidefinite: coordinates {i[k] + 1} and {j[k] + 1} "
             f"have the diagonal entries {diagonal[i[k]]:.4g} and {diagonal[j[k]]:.4g} but the entry "
-            f"{entries.data[k]:.4g} between them",
+            f"{entries.data[k]:.4g} between them; {CHECK_EXPORT}",
             f"structure.reduced.{name}",
         )
 
@@ -325,7 +327,9 @@ def _compute_free_interface_shapes(
         factor = _factorize((K + shift * M).tocsc()) if shift else None
     if factor is None:
         raise PatchfemError(
-            "a part of the structure has neither stiffness nor mass", "structure.reduced.stiffness"
+            "a part of the structure has neither stiffness nor mass; "
+            "leave out its coordinates, or connect them",
+            "structure.reduced.stiffness",
         )
 
     # The attachment modes take the place of as many modes.
@@ -477,7 +481,7 @@ def _compute_elastic_modes(stiffness, mass) -> tuple[np.ndarray, np.ndarray]:
         raise PatchfemError(
             "the stiffness matrix is not positive semidefinite: for one motion the stiffness divided "
             f"by the mass is {squares[0]:.3g} 1/s^2, which is {squares[0] / squares[-1]:.2g} times the "
-            "largest such quotient",
+            f"largest such quotient; {CHECK_EXPORT}",
             "structure.reduced.stiffness",
         )
     is_elastic = squares > min_square

@@ -135,7 +135,8 @@ def _require_same_patch(first: PatchState, second: PatchState) -> None:
     # Range of heights [m] below which an unworn surface is flat
     if difference > GAP_DIFFERENCE_FRACTION * float(np.ptp(unworn[1])) + 1e-12:
         raise PatchfemError(
-            f"{both}: their unworn surfaces differ by {format_length(difference, 3)}"
+            f"{both}: their unworn surfaces differ by {format_length(difference, 3)}; "
+            "compare runs of the same pieces"
         )
     volumes = [state.measures.get("worn_volume", (0.0, None))[0] for state in (first, second)]
     if volumes[1] < volumes[0]:

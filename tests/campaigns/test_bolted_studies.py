@@ -167,9 +167,24 @@ def test_scene_written_by_a_backbone_over_load_has_the_load_of_the_modal_test(
 @pytest.mark.parametrize(
     "joint, key, values, end",
     [
-        ("written", "contact.load", ["3.2 kN", "4 kN"], "the modal test."),
-        ("written", "normal.load", ["3.2 kN", "4 kN"], "the modal test."),
-        ("written", "normal.load", ["3.2 kN", "4.8 kN"], "; no curve has this value."),
+        (
+            "written",
+            "contact.load",
+            ["3.2 kN", "4 kN"],
+            "scene; set it there to that of the modal test.",
+        ),
+        (
+            "written",
+            "normal.load",
+            ["3.2 kN", "4 kN"],
+            "scene; set it there to that of the modal test.",
+        ),
+        (
+            "written",
+            "normal.load",
+            ["3.2 kN", "4.8 kN"],
+            ", which no curve has; set it there to that of the modal test.",
+        ),
         ("case", "normal.load", ["3.2 kN", "4 kN"], None),
         ("written", "structure.moving_mass", ["1.3 kg", "1.5 kg"], None),
     ],

@@ -86,8 +86,8 @@ def test_exact_summary_states_coarsest_sufficient_run_or_worst_measure():
     within = "a knob at 4: 2 CPU s per run, with every measure that has an error estimate within the tolerance 0.01"
     assert describe_best_setting(runs, 1e-2) == within
     assert describe_best_setting(runs, 1e-3) == (
-        "no setting is known to meet the tolerance 0.001: the best run, with a knob at 8, has an error of 0.002 in a and "
-        "takes 5 CPU s"
+        "no setting is known to meet the tolerance 0.001: the best run, with a knob at 8, has a relative error of "
+        "0.002 in a and takes 5 CPU s"
     )
     # a coarse run that is accurate by chance does not count
     assert describe_best_setting([make_cost("1", 0.5, 1e-4), *runs], 1e-2) == within
@@ -261,7 +261,7 @@ def test_exact_cost_of_backbone_has_values_of_backbone(monkeypatch):
     ends = np.array([4e-7, 1e-3])
     monkeypatch.setattr(backbone_cost, "TOLERANCES", (1e-3,))
     monkeypatch.setattr(backbone_cost, "N_AMPLITUDES", 2)
-    monkeypatch.setattr(backbone_cost, "default_amplitudes", lambda _: ends)
+    monkeypatch.setattr(backbone_cost, "find_default_range", lambda _: ends)
     text = POINT + IWAN + STRUCTURE.partition("[drive]")[0]
     answer = pf.cost(text, backbone=True, say=lambda line: None)
     (run_of_curve,) = answer["tolerance"]["runs"]
@@ -273,3 +273,18 @@ def test_exact_cost_of_backbone_has_values_of_backbone(monkeypatch):
             assert run_of_curve["values"][found] == pytest.approx(value, rel=1e-9)
             assert run_of_curve["errors"][found] == pytest.approx(error, rel=1e-9)
     assert run_of_curve["meets_tolerance"]
+
+
+def test_exact_cost_of_backbone_leaves_out_amplitudes_without_a_motion(monkeypatch):
+    """Amplitudes at which the mode does not oscillate are not looked for again in every run; the note lists the others."""
+    monkeypatch.setattr(backbone_cost, "N_AMPLITUDES", 3)
+    monkeypatch.setattr(backbone_cost, "find_default_range", lambda _: (1e-5, 3e-5))
+    law = {"friction.law": "elastic-plastic", "friction.bond_length": "1 um"}
+    model = pf.build(pf.new("rig"), **law)
+    subject = backbone_cost.make_backbone_subject(model)
+    assert "at these amplitudes: 10 um, 30 um." in subject.notes[0]
+    measures = subject.solve(model).measures
+    curves = pf.backbone(model, amplitudes=[1e-5, 3e-5], method="balance")
+    for k, place in enumerate(("smallest", "largest")):
+        found = measures[f"frequency_at_{place}_amplitude"].value
+        assert found == pytest.approx(curves["balance_frequency"].values[k], rel=1e-12)

@@ -186,7 +186,7 @@ def test_exact_patch_that_sticks_wears_nothing(result_folders, tmp_path):
         ),
         (("other", "worn"), "worn: these are two different patches: contact.tilt differ"),
         (("pressed", "point"), "point: a run without [contact] has no surfaces to compare"),
-        (("pressed", "nowhere"), "nowhere: there is no such folder"),
+        (("pressed", "nowhere"), "nowhere: no such results folder"),
         (("empty", "worn"), "empty: this is not a results folder"),
         (("file.csv", "worn"), "file.csv: a file, while"),
     ],

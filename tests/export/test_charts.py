@@ -133,3 +133,32 @@ def test_exact_colours_of_a_map_are_symmetric_only_if_its_values_change_their_si
     for shift, ends in ((-3.0, (-2.0, 2.0)), (0.0, (0.0, 5.0))):
         (trace,) = make_plotly_figure(make_panel("map", [make_map("a", HEIGHT + shift)]))["data"]
         assert (trace["zmin"], trace["zmax"]) == ends
+
+
+@pytest.mark.parametrize(
+    "values, labels",
+    [
+        ([20.0, 200.0], {"tickvals": ["20", "50", "100", "200"]}),
+        ([0.3, 0.9], {"tickvals": ["0.3", "0.5", "0.7"]}),
+        ([1e-3, 1e2], {"dtick": 1}),
+        ([1e-9, 1e3], {}),
+        ([1.0, 1.5], {}),
+    ],
+)
+def test_exact_labels_of_a_logarithmic_axis_are_whole_numbers(values, labels):
+    """Up to 2.5 decades have labels such as 20 and 50, more the powers of ten; those of a map are of its rows."""
+    rows = np.array(values)
+    curves = {
+        "line": Curve("", X, np.resize(rows, X.size)),
+        "map": Curve("", X, np.ones((2, X.size)), rows=rows),
+    }
+    for style, curve in curves.items():
+        panel = Panel("a", style, Axis("x"), Axis("y", is_log=True), [curve], "a caption")
+        axis = make_plotly_figure(panel)["layout"]["yaxis"]
+        assert axis.get("dtick") == labels.get("dtick")
+        shown = []
+        for text, place in zip(axis.get("ticktext", []), axis.get("tickvals", []), strict=True):
+            assert float(text) == pytest.approx(place, rel=1e-12)
+            if rows[0] * (1 - 1e-9) <= place <= rows[1] * (1 + 1e-9):
+                shown.append(text)
+        assert shown == labels.get("tickvals", [])

@@ -213,6 +213,19 @@ def test_always_page_works_in_browser(folders, chromium):
         assert count >= len(read_charts(read_page(folders(name))))
 
 
+def test_always_printed_page_fits_the_paper(folders, chromium):
+    """Before printing, charts get the width of a column or of the sheet, and the measures are shown; then they return."""
+    page = chromium.visit(folders("rig") / "report.html")
+    page.wait_for_charts()
+    widths = "[...document.querySelectorAll('.chart .main-svg:first-child')].map((one) => one.clientWidth)"
+    before = page.evaluate(widths)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert set(page.evaluate(widths)) == {320, 660}
+    assert page.evaluate("document.getElementById('measures').open")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate(widths) == before and page.faults == []
+
+
 def test_exact_response_curves_stand_in_order_of_their_levels(folders):
     """On a page, response curves are sorted by drive level on a logarithmic axis, and their chart is the first one."""
     answer = store.read_answer(folders("curve"))

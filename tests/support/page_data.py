@@ -95,6 +95,9 @@ def find_wrong_numbers(
         value, error = parse_quantity(text)
         tolerance = max(2e-3 * (entry["error"] or 0.0), rounding * abs(entry["value"]))
         tolerance = max(tolerance, 0.06 * (error or 0.0), entry["floor"])
+        if entry["error"] is None and None not in (entry["low"], entry["high"]):
+            # the last of the two digits of the half-width of an interval
+            tolerance = max(tolerance, 0.05 * (entry["high"] - entry["low"]) / 2)
         if abs(value - entry["value"]) > tolerance:
             wrong.append(f"{name}: {text}, but {entry['value']:g} in the file")
         if error is not None and abs(error - entry["error"]) > 0.06 * entry["error"]:

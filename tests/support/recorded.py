@@ -34,6 +34,7 @@ import recorded_scenes  # noqa: E402
 import scene_texts  # noqa: E402
 from traces import KINDS, write_traces  # noqa: E402
 
+from patchfem.runs.patch.store import clear_cache  # noqa: E402
 from patchfem.scene import UNIT_FACTORS  # noqa: E402
 
 GROUPS = tomllib.loads((RECORDED / "commands.toml").read_text("utf-8"))
@@ -125,10 +126,11 @@ def run_scene(name: str, folder: Path) -> dict:
     words = [f"{name}.toml", *(word for assignment in sets for word in ("--set", assignment))]
     commands = {  # The plan comes last: it depends on whether all code is compiled.
         "check": ["check", *words],
-        "run": ["run", *words, "-o", f"../{name}", "-q", "--fresh"],
+        "run": ["run", *words, "-o", f"../{name}", "-q"],
         "plan": ["plan", *words, "--json"],
         "cite": ["cite", *words],
     }
+    clear_cache()
     answers = {verb: recorded_scenes.run_command(*command) for verb, command in commands.items()}
     (folder / f"{name}.json").write_text(json.dumps(answers), "utf-8")
     results = recorded_scenes.read_results(folder, name)

@@ -27,9 +27,7 @@ def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
 
     `joints` are the modes with their contact. The amplitudes lie closer where frequency or damping change fast.
     """
-    ends = np.array([_default_range(joint) for joint in joints])
-    low, high = ends[:, 0].min(), ends[:, 1].max()
-    high = min(high, *(joint.model.rig.springs.travel for joint in joints))
+    low, high = find_default_range(joints)
     if joints[0].is_linear:
         # Number of amplitudes of a linear rig, whose values are constant
         return np.geomspace(low, high, 4)
@@ -38,6 +36,13 @@ def default_amplitudes(joints: list[JointMode]) -> np.ndarray:
     for joint in joints:
         amplitudes = refine_amplitudes(joint, amplitudes)
     return amplitudes
+
+
+def find_default_range(joints: list[JointMode]) -> tuple[float, float]:
+    """Return the smallest and largest default amplitude [m] at the output of one or several modes with their contact."""
+    ends = np.array([_default_range(joint) for joint in joints])
+    travel = min(joint.model.rig.springs.travel for joint in joints)
+    return float(ends[:, 0].min()), float(min(ends[:, 1].max(), travel))
 
 
 def _default_range(joint: JointMode) -> tuple[float, float]:

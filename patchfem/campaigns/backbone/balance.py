@@ -55,7 +55,8 @@ def compute_balance_curve(joint: JointMode, amplitudes) -> Curve:
     rig = joint.steady_laws()
     if joint.is_rigid and not joint.modes.omega.all():
         raise PatchfemError(
-            "with rigid friction the free motion cannot be computed if the rig has a mode of 0 Hz"
+            "with rigid friction the free motion cannot be computed if the rig has a mode of 0 Hz; "
+            "use a law with a stiffness, such as elastic-plastic"
         )
 
     motions = FreeMotions(rig, joint.mode).find(amplitudes)
@@ -202,7 +203,10 @@ def compute_constant_curve(joint: JointMode, amplitudes) -> Curve:
     modes = joint.modes
     omega, zeta = _sustain_linear_motion(joint, np.eye(modes.omega.size))
     if omega is None:
-        raise NotConverged("the mode does not oscillate: its damping ratio is 1 or more")
+        raise NotConverged(
+            "the mode does not oscillate: its damping ratio is 1 or more; "
+            "give the mode less damping"
+        )
     excitation = np.outer(modes.output, modes.output) / joint.reach**2
     forced_omega, forced_zeta = _sustain_linear_motion(joint, excitation)
     force = forced_frequency = np.nan

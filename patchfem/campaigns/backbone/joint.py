@@ -331,7 +331,8 @@ def _check_mode(joint: JointMode) -> None:
     # The mode has a natural frequency while the joint slides or while it sticks.
     if not (modes.omega[joint.mode] or joint.stuck_mode.omega):
         raise PatchfemError(
-            "this mode has 0 Hz and rigid friction acts on it, so the mode has no natural frequency"
+            "this mode has 0 Hz and rigid friction acts on it, so the mode has no natural frequency; "
+            "use a law with a stiffness, such as elastic-plastic"
         )
 
     # Damping depends on the amplitude only if the mode moves the contact, or if a spring is nonlinear. The amplitude is the

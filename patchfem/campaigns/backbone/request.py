@@ -178,10 +178,8 @@ def _note_written_value(base: Model, axis: Axis, backbones: list[Backbone]) -> l
     if written.unit:
         values = written.values + axis.values
         text, *listed = [format_quantity(number, written.unit, 4) for number in values]
-    note = (
-        f"the modes count as measured with {axis.key} = {text}, the value in the scene, which has to be that of the modal "
-        "test"
-    )
-    if text not in listed:
-        note += "; no curve has this value"
-    return [note]
+    gap = "" if text in listed else ", which no curve has"
+    return [
+        f"the modes count as measured at {axis.key} = {text}, the value in the scene{gap}; set it there to that of "
+        "the modal test"
+    ]

@@ -136,7 +136,8 @@ def read_response_table(path: Path) -> Readings:
                 measured.append(value)
     if not row_numbers:
         raise PatchfemError(
-            f"{path}: no row has an acceleration or a displacement, so nothing can be fitted"
+            f"{path}: no row has an acceleration or a displacement, so nothing can be fitted; "
+            "fill in one of the two columns"
         )
 
     # inputs that differ only by the round-off of a unit conversion are one condition

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..quantities import DISPLAY_UNIT_LADDERS, choose_scale
+from ..rows import Chart
 
 MAX_CURVE_INTERVALS = 3000  # largest number of intervals of which a curve keeps the extremes
 
@@ -189,3 +190,14 @@ def select_curve_points(values: np.ndarray, count: int = MAX_CURVE_INTERVALS) ->
 def join_names(*names: str) -> str:
     """Return the parts of an entry of the legend that are not empty."""
     return ", ".join(name for name in names if name)
+
+
+def add_choices(chart: Chart, panels: list[Panel]) -> Panel | None:
+    """Return the first of the panels with a menu of all of them, and with title, caption and style of the chart.
+
+    A single panel has no menu, and its own style. Without panels the panel is None.
+    """
+    if not panels:
+        return None
+    panel = replace(panels[0], title=chart.title, caption=chart.caption)
+    return replace(panel, style=chart.style, choices=panels) if len(panels) > 1 else panel

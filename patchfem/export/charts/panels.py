@@ -7,7 +7,7 @@ import numpy as np
 from ...formatting import format_number, needs_log_scale
 from ..answer import Answers, Variable, Variables
 from ..rows import Chart
-from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
+from .panel import Axis, Curve, Panel, add_choices, join_names, make_axis, select_curve_points
 
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
 BOLD_CURVE_WEIGHT = 1.8  # width of a recommended curve over the usual one
@@ -29,7 +29,7 @@ def make_panels(answers: Answers, charts: tuple[Chart, ...]) -> list[Panel]:
     panels = []
     for chart in charts:
         if len(answers) > 1 and chart.y == "curve_amplitude" and chart.x == "curve_frequency":
-            panels += _make_curve_menu(answers, chart)
+            panels.append(_make_curve_menu(answers, chart))
             continue
         for part in _repeat_for_interfaces(chart, next(iter(answers.values())).data):
             # answers whose variables have other units need axes of their own
@@ -56,7 +56,7 @@ def _repeat_for_interfaces(chart: Chart, data: Variables) -> list[Chart]:
     return charts
 
 
-def _make_curve_menu(answers: Answers, chart: Chart) -> list[Panel]:
+def _make_curve_menu(answers: Answers, chart: Chart) -> Panel | None:
     """Return the response curves of several answers: a menu of amplitude and, under forces, compliance.
 
     Compliances of a linear structure coincide, so that curves that differ show the effect of the level.
@@ -64,11 +64,8 @@ def _make_curve_menu(answers: Answers, chart: Chart) -> list[Panel]:
     titles = {"curve_amplitude": "amplitude", "curve_compliance": "compliance (amplitude / force)"}
     charts = [replace(chart, y=name, title=title) for name, title in titles.items()]
     panels = [make_panel(answers, choice) for choice in charts]
-    panels = [panel for panel in panels if panel is not None]
-    if not panels:
-        return []
-    panel = replace(panels[0], title=chart.title)
-    return [replace(panel, style="menu", choices=panels) if len(panels) > 1 else panel]
+    known = [panel for panel in panels if panel is not None]
+    return add_choices(replace(chart, style="menu"), known)
 
 
 def make_panel(answers: Answers, chart: Chart) -> Panel | None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...formatting import format_number
 from ..quantities import VALUE_ROUND_OFF
 from .panels import Curve, Panel
 
@@ -20,8 +21,13 @@ STATE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")
 OVERLAID_CURVE_COLOURS = ((158, 178, 200), (42, 120, 192), (209, 89, 42))
 ERROR_BAND_OPACITY = 0.18  # opacity of an error band, 1 for the colour of its curve
 FILM_FRAME_MILLISECONDS = 120
-# largest number of decades of a logarithmic axis with labels at 1, 2 and 5; more have room for powers of 10 only
-MAX_DECADES_WITH_DIGITS = 3
+# Labels of a logarithmic axis within a decade, by the number of decades up to which they have room
+LABELLED_DIGITS = {0.7: (1, 1.5, 2, 3, 5, 7), 2.5: (1, 2, 5)}
+# Numbers of decades between which an axis has these labels, or all powers of 10; others have the labels of plotly.js
+MIN_LABELLED_DECADES = 0.3
+MAX_LABELLED_DECADES = 8
+# Keys of an axis that differ among the charts of a menu
+AXIS_KEYS = ("type", "dtick", "tickvals", "ticktext", "range")
 # figure of plotly.js, or a part of it, as an object of its JSON
 Figure = dict[str, Any]
 # Position of a menu, above its chart.
@@ -48,7 +54,9 @@ def _make_layout(panel: Panel) -> Figure:
     is_film = panel.style == "film"
     layout = {
         "xaxis": _make_axis_layout(panel.x, [curve.x for curve in panel.curves]),
-        "yaxis": _make_axis_layout(panel.y, [curve.y for curve in panel.curves]),
+        "yaxis": _make_axis_layout(
+            panel.y, [curve.y if curve.rows is None else curve.rows for curve in panel.curves]
+        ),
         "showlegend": not is_film and sum(bool(curve.name) for curve in panel.curves) > 1,
     }
     if panel.style == "area":
@@ -75,18 +83,32 @@ def _make_axis_layout(axis, columns) -> Figure:
         "exponentformat": "power",
     }
     if axis.is_log:
-        # By default the labels of one or two decades are all digits, which overlap.
         values = np.concatenate([np.ravel(column) for column in columns])
         values = values[np.isfinite(values) & (values > 0)]
         # Round-off beside large values would stretch the axis over many decades.
         is_known = values > VALUE_ROUND_OFF * values.max(initial=0.0)
-        if not is_known.all():
-            ends = np.log10([values[is_known].min(), values.max()])
-            room = 0.05 * np.ptp(ends) + 0.02
-            layout["range"] = [ends[0] - room, ends[1] + room]
-        if values.size and 1 < np.log10(values.max() / values.min()) < MAX_DECADES_WITH_DIGITS:
-            layout["dtick"] = "D2"
+        if values.size:
+            low, high = np.log10([values[is_known].min(), values.max()])
+            layout |= _make_log_labels(low, high)
+            if not is_known.all():
+                room = 0.05 * (high - low) + 0.02
+                layout["range"] = [low - room, high + room]
     return layout
+
+
+def _make_log_labels(low: float, high: float) -> Figure:
+    """Return the labels of a logarithmic axis from `low` to `high`, both logarithms.
+
+    By default plotly.js writes 20 as a small 2 beside 10, and the labels of many decades overlap.
+    """
+    if not MIN_LABELLED_DECADES < high - low < MAX_LABELLED_DECADES:
+        return {}
+    digits = next((digits for room, digits in LABELLED_DIGITS.items() if high - low < room), ())
+    if not digits:
+        return {"dtick": 1}
+    powers = 10.0 ** np.arange(np.floor(low), high + 1)
+    labels = np.outer(powers, digits).ravel().tolist()
+    return {"tickvals": labels, "ticktext": [format_number(one, 2) for one in labels]}
 
 
 def _make_vertical_line(position: float) -> Figure:
@@ -192,7 +214,7 @@ def _add_menu(figure: Figure, choices: list[Panel]) -> None:
         layout = _make_layout(choice)
         for name in ("xaxis", "yaxis"):
             axis = layout[name]
-            changes |= {f"{name}.{key}": axis.get(key) for key in ("type", "dtick", "range")}
+            changes |= {f"{name}.{key}": axis.get(key) for key in AXIS_KEYS}
             changes[f"{name}.autorange"] = "range" not in axis
             changes[f"{name}.title.text"] = axis["title"]["text"]
         arguments = [{"visible": visible}, changes]

@@ -15,7 +15,7 @@ from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MAX_TRUSTED_RELATIVE
 from ..answer import Answer, Answers, Variables
 from ..quantities import VALUE_ROUND_OFF, format_value
 from ..rows import Chart
-from .panel import Axis, Curve, Panel, join_names, make_axis, select_curve_points
+from .panel import Axis, Curve, Panel, add_choices, join_names, make_axis, select_curve_points
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
 MAX_MAP_VALUES_PER_KEY = 40  # values of each key in a map
@@ -184,18 +184,7 @@ def make_relative(answers: Answers, chart: Chart) -> Panel | None:
 def make_menu(answers: Answers, chart: Chart) -> Panel | None:
     """Return the measures against a swept key, one panel each, with a menu that selects the panel to show."""
     names = list_measures(answers)
-    return _add_choices(chart, [make_measure_panel(answers, name) for name in names])
-
-
-def _add_choices(chart: Chart, panels: list[Panel]) -> Panel | None:
-    """Return the first of the panels with a menu of all of them, and with title, caption and style of the chart.
-
-    A single panel has no menu, and its own style. Without panels the panel is None.
-    """
-    if not panels:
-        return None
-    panel = replace(panels[0], title=chart.title, caption=chart.caption)
-    return replace(panel, style=chart.style, choices=panels) if len(panels) > 1 else panel
+    return add_choices(chart, [make_measure_panel(answers, name) for name in names])
 
 
 def make_measure_panel(answers: Answers, name: str) -> Panel:
@@ -255,7 +244,7 @@ def make_map_menu(answers: Answers, chart: Chart) -> Panel | None:
             curve = Curve("", x[columns], values, rows=y[rows])
             title = name.replace("_", " ")
             panels.append(Panel(title, "map", x_axis, y_axis, [curve], colour_label=axis.label))
-    return _add_choices(chart, panels)
+    return add_choices(chart, panels)
 
 
 STYLE_FUNCTIONS = {

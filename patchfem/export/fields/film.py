@@ -90,7 +90,7 @@ def make_stress_panels(path: Path) -> list[Panel]:
     times = make_axis("time", "s", elapsed)
     curves = [
         Curve(
-            name=f"{format_number(float(time) * times.scale, 5)} {times.unit}",
+            name=f"{format_number(float(time) * times.scale, 3)} {times.unit}",
             x=x * x_axis.scale,
             y=values * colours.scale,
             rows=y * y_axis.scale,

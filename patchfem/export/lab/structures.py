@@ -123,7 +123,10 @@ def make_elements(model: Model) -> dict[str, np.ndarray]:
     if model.patch is not None:
         patch = case_meshes.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
-            raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
+            raise PatchfemError(
+                "the pieces do not touch, so no friction acts; raise the load or close the gap",
+                "contact",
+            )
 
     groups = [_sort_elements(*joint.list_elements()) for joint in list_parts(model, patch)]
     stiffness, yields = (np.concatenate(parts) for parts in zip(*groups))

@@ -191,8 +191,6 @@ def export_histories(folder: Path, out: Path) -> str:
     Missing
         If the folder does not exist, or if the file cannot be written.
     """
-    if not folder.is_dir():
-        raise Missing(f"{folder}: no such results folder")
     answer = store.read_answer(folder)
     columns = list_columns(answer)
     # a fitted loop may have no time

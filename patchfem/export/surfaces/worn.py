@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Missing, PatchfemError
+from ...core import PatchfemError
 from ...formatting import format_length, format_number
 from ...scene.keys.quantities import parse_quantity
 from ...surface.compare.records import Comparison
@@ -59,13 +59,14 @@ def read_patch(folder: Path) -> PatchRun:
     PatchfemError
         If it does not have the results of a run with [contact].
     """
-    if not folder.exists():
-        raise Missing(f"{folder}: there is no such folder")
     answer = store.read_answer(folder)
     data = answer.data
     scene = tomllib.loads(answer.origin.get("resolved", ""))
     if "contact" not in scene:
-        raise PatchfemError(f"{folder}: a run without [contact] has no surfaces to compare")
+        raise PatchfemError(
+            f"{folder}: a run without [contact] has no surfaces to compare; "
+            "give a run with [contact] and [wear]"
+        )
     missing = [name for name in REQUIRED_VARIABLES if name not in data]
     if missing:
         raise PatchfemError(
@@ -82,7 +83,9 @@ def read_patch(folder: Path) -> PatchRun:
     try:
         area, gap, depth = (np.broadcast_to(field, shape) for field in fields)
     except ValueError:
-        raise PatchfemError(f"{folder}: the fields in result.nc differ in length") from None
+        raise PatchfemError(
+            f"{folder}: the fields in result.nc differ in length; run the scene again"
+        ) from None
 
     # Measures of the wear with their errors, as far as the run has them.
     measures = {
@@ -333,9 +336,7 @@ def answer_runs(before: Path, after: Path) -> Answer:
         If a folder is no run of a patch, or if the two are not states of one patch in this order.
     """
     for path, other in ((before, after), (after, before)):
-        if not path.exists():
-            raise Missing(f"{path}: there is no such folder")
-        if not path.is_dir():
+        if path.is_file():
             raise PatchfemError(
                 f"{path}: a file, while {other} is a folder: two files of surfaces or two results folders are needed"
             )

@@ -117,7 +117,8 @@ def split_trace(
     waves = trace_moments(trace, cutoff).fine
     if not waves.slope > 0:
         raise PatchfemError(
-            f"{trace.source}: no waves are shorter than {format_length(cutoff)}, so that there is nothing to split",
+            f"{trace.source}: no waves are shorter than {format_length(cutoff)}, so that there is nothing to split; "
+            "give a longer cut-off",
             PROFILE_KEY,
         )
     # By Westergaard's solution, a sine of this rms slope closes completely at this pressure.

@@ -81,7 +81,9 @@ def _check_mesh(patch: TableFacts, flat_length: float) -> None:
     size = patch.element_size
     if size > flat_length:
         name = "contact.length =" if flat_length == patch.length else "the interface length of"
-        patch.add_mistake("element_size", f"{size} m is longer than {name} {flat_length} m")
+        patch.add_mistake(
+            "element_size", f"{size} m is longer than {name} {flat_length} m; give shorter elements"
+        )
     if patch.length > MAX_INTERFACE_ELEMENTS * size:
         patch.add_mistake(
             "element_size",

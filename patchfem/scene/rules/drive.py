@@ -26,7 +26,9 @@ def _check_waveform(drive: TableFacts) -> None:
         )
     amplitudes = drive.accelerations
     if wave.accepts_key("accelerations") and amplitudes and not any(amplitudes):
-        drive.add_mistake("accelerations", "all accelerations are 0, so nothing moves")
+        drive.add_mistake(
+            "accelerations", "all accelerations are 0, so nothing moves; give one above 0"
+        )
 
     # The two frequencies of a sweep, or of the band of a random drive.
     if wave.is_swept and drive.from_ == drive.to:
@@ -35,7 +37,11 @@ def _check_waveform(drive: TableFacts) -> None:
             f"{drive.to:g} Hz is also the frequency at which the sweep starts; give a different frequency",
         )
     if wave.is_random and drive.to <= drive.from_:
-        drive.add_mistake("to", f"{drive.to:g} Hz is not above drive.from, {drive.from_:g} Hz")
+        drive.add_mistake(
+            "to",
+            f"{drive.to:g} Hz is not above drive.from, {drive.from_:g} Hz; "
+            "raise it, or lower drive.from",
+        )
     for key in ("from", "to"):
         if wave.is_random and drive.has("spectrum") and not drive.has(key):
             drive.add_missing(

@@ -213,7 +213,8 @@ def _measure_scan(scan: Areal) -> tuple[list[Quantity], tuple[str, ...]]:
     count = int(scan.missing.sum())
     if count == scan.z.size:
         raise PatchfemError(
-            f"{scan.source}: no measured height is left within half a cut-off of the borders"
+            f"{scan.source}: no measured height is left within half a cut-off of the borders; "
+            "give a shorter cut-off"
         )
     steps = (measure_step(scan.y), measure_step(scan.x))
     quantities = []

@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 from command_line import read_json, read_page
 from comparisons import FINDINGS, VERDICTS, compare_pair, compare_traces
-from page_data import read_tiles
+from page_data import (
+    find_strange_curves,
+    find_wrong_numbers,
+    read_charts,
+    read_measures,
+    read_tiles,
+)
 
 from patchfem.export import netcdf, page, quantities, store
 from patchfem.export.answer import Quantity
@@ -174,3 +180,6 @@ def test_exact_page_is_made_again_and_shows_the_files(written):
         name = label.replace(" ", "_")
         assert quantities.format_quantity(name, parse(summary["measures"][name])) == shown
         assert f'<div title="{quantities.describe_quantity(name, "compare")}">' in text
+    shown = read_measures(text)
+    assert len(shown) > 5 and find_wrong_numbers(shown, summary["measures"], 5e-3) == []
+    assert read_charts(text) and find_strange_curves(text, folder / "result.nc") == []

@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import read_page, run_cli, run_successfully
-from page_data import read_figures
+from command_line import read_json, read_page, run_cli, run_successfully
+from page_data import find_wrong_numbers, read_figures, read_measures, read_tiles
 from scene_texts import COULOMB, PATCH, POINT, SHORT, STRUCTURE
 from sweep_tables import read_rows
 
@@ -113,6 +113,18 @@ def test_exact_page_shows_numbers_of_table(folders, kind):
         for name in answer.data
         if f"{name}_error" in answer.data
     )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_exact_tiles_and_measures_of_page_equal_summary(folders, kind):
+    """Every number among the tiles and measures of the page is that of summary.json."""
+    page = read_page(folders[kind])
+    quantities = read_json(folders[kind] / "summary.json")["measures"]
+    tiles = {label.replace(" ", "_"): text for label, text in read_tiles(page).items()}
+    texts = read_measures(page)
+    assert tiles and texts
+    assert find_wrong_numbers(tiles, quantities, 5e-3) == []
+    assert find_wrong_numbers(texts, quantities, 5e-3) == []
 
 
 def test_exact_numbers_of_verdict_agree_with_closed_form(folders):

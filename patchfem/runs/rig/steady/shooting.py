@@ -571,7 +571,8 @@ class ShootingFinder:
             )
             if point is None:
                 raise NotConverged(
-                    "accuracy.method: no steady motion was found between two neighbouring points of the curve"
+                    "accuracy.method: no steady motion was found between two neighbouring points of the curve; "
+                    'use accuracy.method = "march"'
                 )
             return self._describe_path_point(point)
         omega = first.drive.omega + fraction * (second.drive.omega - first.drive.omega)
