@@ -7,6 +7,7 @@ import numpy as np
 
 from ..motion_measures import Observations, energy_balance, measure_acceleration, measure_interface
 from .cases import Case
+from .laws import LAWS
 from .records import (
     N_FACE_INTEGRALS,
     N_INTEGRALS,
@@ -65,10 +66,12 @@ def compute_measures(case: Case, state: State, record: Record) -> dict[str, floa
     work = split_integrals(case, state.y) - split_integrals(case, state.rows[WINDOW_START])
     windows = record.faces[:count].T
     cycles = record.cycles[record.cycles[:, Cycle.WINDOW] >= 0]
+    loads = faces[:, Probe.LOAD, Extreme.MAX]
+    limits = find_force_limits(case.rig.faces[:count], loads)[:, None]
     observations = Observations(
         span=span,
         period=period,
-        force=faces[:, Probe.FORCE],
+        force=np.clip(faces[:, Probe.FORCE], -limits, limits),
         slip=faces[:, Probe.SLIP],
         stick=windows[[Window.STUCK, Window.STARTS, Window.COS_START, Window.SIN_START]],
         work=whole * work[:count, 0],
@@ -84,6 +87,27 @@ def compute_measures(case: Case, state: State, record: Record) -> dict[str, floa
         values["normal_load_peak"] = faces[0, Probe.LOAD, Extreme.MAX]
         values["open_fraction"] = windows[Window.OPEN, 0] / span
     return values
+
+
+def find_force_limits(faces, loads) -> np.ndarray:
+    """Return the largest friction forces (i,) [N] of interfaces whose state approaches its limit; inf of other laws.
+
+    The force of bonds that all break approaches its limit faster than a step takes, so that the steps of the state, which
+    are stable only just, pass the limit by more than their tolerance.
+
+    Parameters
+    ----------
+    faces : (i, k) ndarray
+        Rows `records.Face` of the interfaces.
+    loads : (i,) ndarray
+        Largest normal loads [N].
+    """
+    limits = np.full(len(faces), np.inf)
+    is_bonded = faces[:, Face.LAW] == LAWS.index("bonds")
+    if is_bonded.any():
+        static, length, last_length = faces[is_bonded, Face.NUMBERS : Face.NUMBERS + 3].T
+        limits[is_bonded] = static * np.maximum(last_length / length, 1.0) * loads[is_bonded]
+    return limits
 
 
 def split_integrals(case: Case, y) -> np.ndarray:

@@ -239,6 +239,17 @@ def test_bonds_have_the_loop_of_dahl():
         assert abs(last.final.y[3]) == pytest.approx(np.tanh(amplitude), rel=1e-9)
 
 
+@pytest.mark.parametrize("ratio", [1.0, 1.3])
+def test_force_of_bonds_that_all_break_does_not_exceed_its_limit(ratio):
+    """Over a thousand bond lengths, the force of bonds is that of their last length to 1e-6, and not more."""
+    growth = (1e-9, 0.1, 1e-4, 0.0) if ratio > 1 else (0.0, 1.0, 1.0, 0.0)
+    law = LawNumbers("bonds", (0.3, 1.0, ratio, *growth), (1.0, 0.0, 0.0, 1.0), (1, 1e-2, 1e-4, 1))
+    motion = runs.run_case(make_bench(law, *triangle(1000.0, 5)))
+    peak = motion.values["friction_force_peak"]
+    assert peak <= 0.3 * ratio
+    assert peak == pytest.approx(0.3 * ratio, rel=1e-6)
+
+
 def test_coulomb_contact_that_lifts_off_follows_the_load():
     """Sliding at constant speed under 1 + 1.5 cos t: work and open time of the positive part of the load."""
     load = cases.Load(1.0, 1.5, 1.0, 0.0)

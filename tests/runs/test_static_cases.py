@@ -65,6 +65,31 @@ def test_always_cases_agree_with_single_runs_within_errors(extra, tolerance):
             assert abs(batch.values[name][case] - measure.value) <= allowed, (name, case)
 
 
+def test_always_rotation_has_the_error_of_the_moment():
+    """Holders without tilt do not turn; on the mesh of tilted ones their rotation is 0 within its error, and allowed."""
+    crown = (
+        '[contact.crown]\nradius = "3 m"\n[contact.holder]\nrotational_stiffness = "300 N m/rad"\n'
+    )
+    group = make_group(BLOCK + TILT + crown)
+    keys = {"angle": np.array([0.0, 0.0, 1e-4, -3e-5])}
+    shapes = [
+        (name, table.model_copy(update=keys if name == "tilt" else {}))
+        for name, table in group.gap.shapes
+    ]
+    group = replace(group, gap=replace(group.gap, shapes=tuple(shapes)))
+    batch = folder.case_meshes.solve_cases(group, LOADS.size, TOLERANCE)
+    assert batch.excess.max() <= 1
+    value, error, moment = (
+        batch.values["rotation"],
+        batch.errors["rotation"],
+        batch.errors["moment"],
+    )
+    assert (np.abs(value) <= error)[:2].all() and (value[:2] != 0).all()
+    # A moment at the holder turns its spring and the contact
+    stiffness = 300 + batch.values["rotational_stiffness"][:2]
+    assert (error[:2] >= 0.99 * moment[:2] / stiffness).all()
+
+
 @pytest.mark.parametrize("extra", [TILT, TILT + STEP, TILT + SKIN, TILT + UNLIKE])
 def test_exact_cases_agree_with_single_runs_on_the_same_mesh(extra):
     """On a mesh that the scene prescribes, values, errors and floors are those of single runs to 1e-9."""

@@ -51,7 +51,7 @@ from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns, select_models
 from ...motion_measures import ratio_or_zero
 from ...points.cases import CaseMarch, is_linear_between_events, list_parameters, march_cases
-from ...points.laws import N_NUMBERS, POINT_LAWS, list_point_law
+from ...points.laws import MIN_LENGTH, N_NUMBERS, POINT_LAWS, list_point_law
 from ...points.rows import Cases, Law, LawNumber, Number
 from ...scene.rules.accuracy import list_fixed_settings
 from ..refine import NO_LIMIT, Verdict, refine
@@ -98,19 +98,24 @@ class Group(NamedTuple):
     - cases: the n cases
     - tolerance: relative tolerance [1]
     - displacement: displacement scale of the rig [m]
-    - stick_stiffness: stiffness of the law during stick [N/m]; 0 of rigid and of viscous laws
+    - length: stretch at the friction limit [m]; inf of rigid and of viscous laws
     - may_create: whether the law may create energy
     """
 
     cases: Cases
     tolerance: np.ndarray
     displacement: np.ndarray
-    stick_stiffness: np.ndarray
+    length: np.ndarray
     may_create: np.ndarray
 
     def read(self, number: Number) -> np.ndarray:
         """Return a parameter (n,) of the cases."""
         return self.cases.parameters[:, number]
+
+    @property
+    def stick_stiffness(self) -> np.ndarray:
+        """Stiffness (n,) of the law during stick [N/m]; 0 of rigid and of viscous laws."""
+        return self.cases.numbers[:, LawNumber.LIMIT] / self.length
 
     @property
     def period(self) -> np.ndarray:
@@ -263,7 +268,7 @@ def _list_numbers(model: Model) -> tuple[float, ...]:
         rig.first_mode.stiffness,
         model.accuracy.tolerance,
         rig.displacement_scale,
-        law.static * load / law.length if has_stiffness else 0.0,
+        np.maximum(law.length, MIN_LENGTH) if has_stiffness else np.inf,
         _may_create_energy(model),
     )  # fmt: skip
 
@@ -592,10 +597,12 @@ def _put_reason(results: CaseResults, name: str, is_missing: np.ndarray, reason:
 
 def _stick_tolerance(group: Group) -> np.ndarray:
     """Return the largest slip amplitude (n,) [m] of a sticking interface; -1 of a law that never sticks."""
-    numbers = group.cases.numbers.T
-    if not group.stick_stiffness.any():
-        return np.where(numbers[LawNumber.LAW] == Law.COULOMB, 0.0, -1.0)
-    return MAX_STICKING_SLIP_RATIO * numbers[LawNumber.LIMIT] / group.stick_stiffness
+    is_rigid = group.cases.numbers[:, LawNumber.LAW] == Law.COULOMB
+    return np.where(
+        np.isfinite(group.length),
+        MAX_STICKING_SLIP_RATIO * group.length,
+        np.where(is_rigid, 0.0, -1.0),
+    )
 
 
 def _judge_motions(group: Group, refined: Refined) -> MotionEnds:
@@ -672,6 +679,8 @@ def needs_single_run(group: Group, refined: Refined, results: CaseResults) -> np
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
     is_alone |= group.may_create > 0
     is_alone |= ~(group.read(Number.LOAD) > 0) | (group.read(Number.DRIVE) == 0)
+    # Bonds and springs stretch although they carry no force
+    is_alone |= (group.cases.numbers[:, LawNumber.LIMIT] == 0) & np.isfinite(group.length)
 
     with np.errstate(invalid="ignore"):
         is_alone |= ~(values["work_check"] <= MAX_WORK_CHECK)

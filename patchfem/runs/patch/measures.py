@@ -242,7 +242,8 @@ def estimate_static_measures(
     missed_peak = unresolved_edge_rounding_pressure(fine)
     resolution = _compute_resolution(fine, missed_peak)
     if centre_error is not None:
-        resolution = resolution._replace(centre_error=centre_error)
+        stiffness = _compute_turn_stiffness(fine, resolution.longest_cell)
+        resolution = resolution._replace(centre_error=centre_error, turn_stiffness=stiffness)
     hidden_errors = estimate_hidden_errors(resolution, finest)
     factor = np.where(missed_peak > 0, UNRESOLVED_ROUNDING_ERROR_FACTOR, 1.0)
     values = np.array(list(finest.values()))
@@ -269,6 +270,12 @@ def estimate_static_measures(
         is_limit[:, rows] = part.is_limit
 
     floors = compute_floors(dict(zip(names, values)), tolerance or 0.0, model.pieces.length)
+    if centre_error is not None:
+        # The rotation due to an error of the moment is allowed if the moment meets its tolerance
+        name = "rotation"
+        row = names.index(name)
+        allowed = HIDDEN_ERROR_EXTRAPOLATION_FACTOR * hidden_errors[name]
+        floors[row] = np.maximum(floors[row], allowed)
     reasons = _find_unbounded_pressure(fine)
     estimates = StaticEstimates(names, values, errors, is_limit, reasons, floors)
     if len(series) > 1 and model.gap.profile is not None:
@@ -561,6 +568,8 @@ class Resolution(NamedTuple):
     - inner_cells: part of `edge_cells` between contact intervals [m].
     - centre_error: error of the centre of a resolved contact, in cells; on a mesh for one contact the errors of its ends
       cancel.
+    - turn_stiffness: stiffness [N m/rad] against the rotation that the load at a wrong centre causes; inf on a mesh for
+      one contact.
     """
 
     length: float
@@ -576,6 +585,7 @@ class Resolution(NamedTuple):
     open_ends: np.ndarray | float = 0.0
     inner_cells: np.ndarray | float = 0.0
     centre_error: float = 1e-3
+    turn_stiffness: np.ndarray | float = np.inf
 
 
 def _compute_resolution(pressed: PressedCases, missed_peak) -> Resolution:
@@ -634,6 +644,23 @@ def _compute_resolution(pressed: PressedCases, missed_peak) -> Resolution:
     )
 
 
+def _compute_turn_stiffness(pressed: PressedCases, cell) -> np.ndarray:
+    """Return the stiffnesses (n,) [N m/rad] of contact and holder against rotations under a load.
+
+    It is inf with a smooth layer, a prescribed rotation or without load. A contact is at least as stiff as one of
+    the length of `cell` (n,) [m], the longest cell in which the contact ends.
+    """
+    if pressed.level.is_smooth:
+        return np.full(len(pressed), np.inf)
+    table = pressed.level.tables[0]
+    work = table.work[table.find_slots(pressed.active)]
+    normal = work[:, 0, 0]
+    coupling = work[:, 0, 1] ** 2 / np.where(normal > 0, normal, np.inf)
+    contact = np.maximum(work[:, 1, 1] - coupling, normal * cell**2 / 12)
+    stiffness = contact + pressed.holder.spring
+    return np.where(pressed.holder.can_rotate & (stiffness > 0), stiffness, np.inf)
+
+
 def estimate_hidden_errors(resolution: Resolution, finest: "Arrays | Values") -> "Arrays | Values":
     """Estimate the errors of the static measures that mesh refinement does not reveal.
 
@@ -670,10 +697,12 @@ def estimate_hidden_errors(resolution: Resolution, finest: "Arrays | Values") ->
     peak_error = np.maximum(peak_error, resolution.wedge_pressure)
     peak_error = np.maximum(peak_error, resolution.rounding_pressure - peak)
 
-    # A nodal displacement has the round-off of its terms, and an error of the centre times the angle of rotation. A
-    # prescribed rotation has neither error.
+    # A nodal displacement has the round-off of its terms, and an error of the centre times the angle of rotation. The load
+    # at a wrong centre turns the contact and the holder. A prescribed rotation has none of these errors.
     displacement = CONTACT_SOLUTION_ROUND_OFF * (np.abs(finest["approach"]) + resolution.closing)
     displacement = displacement + np.abs(finest["rotation"]) * centre_error
+    moment_error = (CONTACT_SOLUTION_ROUND_OFF * length + centre_error) * load
+    turn = moment_error / resolution.turn_stiffness
     fraction_per_pressure = finest["loaded_fraction"] / np.where(peak > 0, peak, np.inf)
 
     edge_offset = 0.0
@@ -692,8 +721,8 @@ def estimate_hidden_errors(resolution: Resolution, finest: "Arrays | Values") ->
         "contact_half_width": width_error / 2,
         "loaded_fraction": peak_error * fraction_per_pressure,
         "pressure_centre": CONTACT_SOLUTION_ROUND_OFF * length + centre_error,
-        "moment": (CONTACT_SOLUTION_ROUND_OFF * length + centre_error) * load,
-        "rotation": displacement / length * resolution.can_rotate,
+        "moment": moment_error,
+        "rotation": (displacement / length + turn) * resolution.can_rotate,
         "approach": CONTACT_SOLUTION_ROUND_OFF * resolution.closing,
     }
 

@@ -164,12 +164,14 @@ class HolderPositions(NamedTuple):
     - approach, rotation (n,): approach [m] and rotation [rad].
     - turn (n,): part of the rotation [rad] that the unloaded gap does not contain.
     - can_rotate (n,): whether the rotation is free.
+    - spring (n,): stiffness [N m/rad] of the holder against the rotation.
     """
 
     approach: np.ndarray
     rotation: np.ndarray
     turn: np.ndarray
     can_rotate: np.ndarray
+    spring: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -529,8 +531,13 @@ def _press_gaps(level: Level, cases: Cases, start) -> tuple[PressedCases, dict[i
     elif level.has_layer:
         layer = np.broadcast_to(level.linear_layer, states.force.shape)
 
+    holders = cases.holders
     positions = HolderPositions(
-        states.approach, cases.rotation + states.turn, states.turn, cases.holders.can_rotate
+        states.approach,
+        cases.rotation + states.turn,
+        states.turn,
+        holders.can_rotate,
+        holders.spring,
     )
     gap = cases.amplitudes @ level.gap.shapes
     return PressedCases(level, states.force, states.gap, gap, positions, layer), states.errors

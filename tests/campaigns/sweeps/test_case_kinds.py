@@ -97,6 +97,15 @@ KINDS = {
         )
         for law, text in LAWS.items()
     },
+    "without friction": (
+        SCENE.format(law=LAWS["nonlocal"], drive=DRIVES["drive.acceleration"]),
+        [
+            "--over",
+            "friction.static=0..0.6:{half}",
+            "--over",
+            "structure.mode.axial.frequency=143 Hz,4290 Hz",
+        ],
+    ),
     "shipped rig": (
         SHIPPED.read_text("utf-8").partition("[measured]")[0],
         ["--over", "contact.load=70 N..125 N:{n}"],
@@ -193,6 +202,12 @@ def test_always_points_of_a_law_agree_with_single_runs(law, tmp_path, monkeypatc
     """The values of the first of many points, which are marched together, lie within the sum of both errors."""
     monkeypatch.chdir(tmp_path)
     assert max(compare_kind(law, MANY, 4)) <= 1
+
+
+def test_always_points_without_friction_agree_with_single_runs(tmp_path, monkeypatch):
+    """The first two of many points, whose bonds carry no force, have the outcome and the values of single runs."""
+    monkeypatch.chdir(tmp_path)
+    assert max(compare_kind("without friction", MANY, 2)) <= 1
 
 
 @pytest.mark.slow
