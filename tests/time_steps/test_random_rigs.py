@@ -13,6 +13,8 @@ from patchfem.scene import loads
 
 FIRST_SEED = 20267001  # 240 rigs from here were drawn for release 3.0
 N_DRAWN = 60
+# Rigs of 2 to 4 faces that stick: rigid, half of them with less kinetic than static friction, or elastic-plastic
+FIRST_STICKING_SEED = 20310501
 MIN_SHARE = 0.98  # of the rows whose error holds
 
 
@@ -38,6 +40,17 @@ def test_drawn_rigs(tolerance):
     """Rigs that a seed draws, beside the event-driven engine."""
     specs = {seed: march_rigs.draw_spec(seed) for seed in range(FIRST_SEED, FIRST_SEED + N_DRAWN)}
     found = {seed: march_rigs.score_drawn_rig(spec, tolerance) for seed, spec in specs.items()}
+    assert_share_holds({seed: score for seed, score in found.items() if score is not None})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_drawn_rigs_of_several_faces_that_stick(tolerance):
+    """Rigs in which one face that stops or begins to slip changes the forces that hold others, beside the other engine."""
+    found = {}
+    for seed in range(FIRST_STICKING_SEED, FIRST_STICKING_SEED + N_DRAWN):
+        spec = march_rigs.draw_spec(seed, march_rigs.STICKING_LAWS, (2, 3, 4))
+        found[seed] = march_rigs.score_drawn_rig(spec, tolerance)
     assert_share_holds({seed: score for seed, score in found.items() if score is not None})
 
 
