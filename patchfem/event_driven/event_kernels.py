@@ -411,6 +411,8 @@ def change_regime(rig, state, i, which):
     t = state.clock[Clock.TIME]
     first = 2 * n + int(face[Face.FIRST_STATE])
     find_rates(rig, state, t, state.y, state.rows[RATES])
+    for k in range(rig.faces.shape[0]):
+        state.memory[k, Memory.RESTED] = 1.0 if rests(state.memory[k]) else 0.0
     point = look(rig, state, i, t, state.y)
     ends = switch_law(
         int(face[Face.LAW]),

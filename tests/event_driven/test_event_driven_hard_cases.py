@@ -1,5 +1,6 @@
 """Hard cases of `event_driven`: the right motion, or an end in a sentence."""
 
+import march_rigs
 import numpy as np
 import pytest
 from event_driven_cases import coulomb, make_modes, make_oscillator
@@ -163,6 +164,16 @@ def test_exact_rigid_interfaces_that_turn_back_with_an_elastic_one(stiffness):
     found, expected = (runs.run_case(case).values for case in (several, single))
     for name in ("friction_work", AMPLITUDE, "loop_area"):
         assert found[name] == pytest.approx(expected[name], rel=1e-8)
+
+
+def test_exact_peak_of_a_force_that_jumps_beyond_its_limit():
+    """Where the stop of one face releases another, the force on that one reaches its static limit within the jump."""
+    spec = march_rigs.draw_spec(20310001, march_rigs.STICKING_LAWS, (2, 3, 4))
+    face = spec["faces"][1]
+    for method in ("exact", "march"):
+        model = march_rigs.make_model(spec, f'tolerance = 1e-2\nmethod = "{method}"\n')
+        peak = pf.run(model, say=lambda line: None).measures["friction_force_peak_2"].value
+        assert peak == pytest.approx(face["keys"]["static"] * face["load"], rel=1e-9)
 
 
 def test_chatter_of_many_interfaces_on_many_modes():
