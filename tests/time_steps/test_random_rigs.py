@@ -14,7 +14,7 @@ from patchfem.scene import loads
 FIRST_SEED = 20267001  # 240 rigs from here were drawn for release 3.0
 N_DRAWN = 60
 # Rigs of 2 to 4 faces that stick: rigid, half of them with less kinetic than static friction, or elastic-plastic
-FIRST_STICKING_SEED = 20310501
+FIRST_STICKING_SEED = 20310601
 MIN_SHARE = 0.98  # of the rows whose error holds
 
 
