@@ -42,6 +42,7 @@ from .step_kernels import CYCLE, N_STAGES, RATES, SCALE, read_curve, step_factor
 from .window_kernels import (
     add_output,
     observe_cycle,
+    observe_releases,
     observe_window,
     write_directions,
     write_event,
@@ -298,6 +299,8 @@ def advance(rig, state, record, t_end, cycle):
             write_event(rig, state, record, face, event.which)
             if change_regime(rig, state, face, event.which):
                 return Status.LEAVES_GROOVES
+            if in_window and clock[Clock.TIME] > first_seen:
+                observe_releases(rig, state, record, face)
             number = int(clock[Clock.N_EVENTS]) - 1
             if number < record.events.shape[0]:
                 find_rates(rig, state, clock[Clock.TIME], state.y, state.rows[RATES])

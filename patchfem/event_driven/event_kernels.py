@@ -411,6 +411,8 @@ def change_regime(rig, state, i, which):
     t = state.clock[Clock.TIME]
     first = 2 * n + int(face[Face.FIRST_STATE])
     find_rates(rig, state, t, state.y, state.rows[RATES])
+    for k in range(rig.faces.shape[0]):
+        state.memory[k, Memory.RESTED] = 1.0 if rests(state.memory[k]) else 0.0
     point = look(rig, state, i, t, state.y)
     ends = switch_law(
         int(face[Face.LAW]),
@@ -420,21 +422,38 @@ def change_regime(rig, state, i, which):
         state.y[first : first + int(face[Face.N_STATES])],
         which,
     )
-    if face[Face.RIGID] and rests(state.memory[i]):
-        stop_together(rig, state)
+    is_rigid = face[Face.RIGID] > 0
+    if not is_rigid or rests(state.memory[i]):
+        stop_together(rig, state, is_rigid)
     hold_or_release(rig, state)
     return ends
 
 
 @njit(**NJIT_KERNEL)
-def stop_together(rig, state):
-    """Bring all rigid interfaces without velocity to rest; the modes lose the round-off of these velocities."""
+def stop_together(rig, state, has_stopped):
+    """Bring rigid interfaces without velocity to rest; the modes lose the round-off of these velocities.
+
+    If one of them `has_stopped`, all do. Where another interface turns back, those do that turn back with it, because the
+    forces before this event (`RATES`) slow them down; the others have just been released.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    has_stopped : bool
+        Whether the event is the stop of a rigid interface.
+    """
     n = rig.modes.shape[1]
     v = state.y[n : 2 * n]
     for i in range(rig.faces.shape[0]):
         row = rig.rows[0, i]
         velocity = project(row, v)
         is_stopping = abs(velocity) < SAME_SPEED_TOL * state.memory[i, Memory.SPEED]
+        if not has_stopped:
+            slowing = state.memory[i, Memory.DIRECTION] * project(row, state.rows[RATES, n : 2 * n])
+            is_stopping = is_stopping and slowing < 0
         if rig.faces[i, Face.RIGID] and state.memory[i, Memory.CONTACT] > 0 and is_stopping:
             state.memory[i, Memory.DIRECTION] = 0.0
         if rests(state.memory[i]):

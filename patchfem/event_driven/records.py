@@ -150,6 +150,7 @@ class Memory(IntEnum):
     - ORIGIN: slide at the start [m]
     - SIZE, SPEED: largest magnitudes of slide [m] and velocity [m/s] so far
     - BEFORE, RELEASED: friction force [N] before the last event, and whether this event released the interface
+    - RESTED: 1 if a rigid law was at rest before the last event
     - STACK: first column of pairs of displacement [m] and force [N] at the reversal points
     """
 
@@ -166,7 +167,8 @@ class Memory(IntEnum):
     SPEED = 10
     BEFORE = 11
     RELEASED = 12
-    STACK = 13
+    RESTED = 13
+    STACK = 14
 
 
 class Margin(IntEnum):

@@ -260,6 +260,34 @@ def observe_window(rig, state, record, cycle, fraction):
 
 
 @njit(**NJIT_KERNEL)
+def observe_releases(rig, state, record, face):
+    """Add the static friction of rigid interfaces that the event of another one has released to the extremes of the window.
+
+    Their forces reach this limit while they jump.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion after the event.
+    record : Record
+        What the run records.
+    face : int
+        Number of the interface of the event.
+    """
+    for i in range(rig.faces.shape[0]):
+        memory = state.memory[i]
+        if i == face or memory[Memory.RESTED] == 0 or memory[Memory.DIRECTION] == 0:
+            continue
+        load = look(rig, state, i, state.clock[Clock.TIME], state.y).load
+        limit = memory[Memory.DIRECTION] * rig.faces[i, Face.NUMBERS] * load
+        row = record.extremes[Probe.FACES + Probe.COUNT * i + Probe.FORCE]
+        row[Extreme.MIN] = min(row[Extreme.MIN], limit)
+        row[Extreme.MAX] = max(row[Extreme.MAX], limit)
+
+
+@njit(**NJIT_KERNEL)
 def observe_reversal(rig, state, fraction, cycle, sign, column):
     """Update the extreme slide of the first interface in a cycle, and the friction force there.
 

@@ -45,7 +45,7 @@ def find_held_ports(system):
     moves = system.ports.values
     is_any_held = False
     for p in range(moves.shape[1]):
-        is_held = steps.is_held(system.points, p)
+        is_held = steps.is_held(system.points.memory, system.points, p)
         moves[Port.HELD, p] = 1.0 if is_held else 0.0
         is_any_held = is_any_held or is_held
     return is_any_held
@@ -93,10 +93,10 @@ def try_step(system, level, row, begin, end, drive):
     # An event inside the step, or Newton's method without a solution, halves the step.
     write_trial(system, level)
     is_last = steps.is_shortest(system, level)
-    if system.options.has_events:
-        last = drive[0] + dt * (drive[1] + 0.5 * dt * drive[2])
-        if steps.find_event(system, level, last):
-            return False
+    last = drive[0] + dt * (drive[1] + 0.5 * dt * drive[2])
+    has_event = bool(system.options.has_events) and steps.find_event(system, level, last)
+    if has_event and not is_last:
+        return False
     if not is_last and steps.gains_energy(system):
         return False
     if not is_solved:
@@ -108,6 +108,9 @@ def try_step(system, level, row, begin, end, drive):
     steps.commit(system, dt)
     advance_modes(system, dt)
     add_energies(system, level)
+    if has_event:
+        steps.settle(system, last)
+        find_held_ports(system)
     return True
 
 

@@ -9,7 +9,9 @@ solve
 
 with the path means and the forces f0, f1 at both ends of the laws (`laws_kernels`), the stiffness kappa of the coordinates
 and w = |d|/(|ds| + |d|). The pieces are in equilibrium at the end of a step, so that a law of the path alone is exact at the
-samples of a monotone stroke, whatever the step. F dq is the work of the laws plus the change of the elastic energy.
+samples of a monotone stroke, whatever the step. F dq is the work of the laws, sum mean ds, plus the change of the elastic
+energy, where the pieces and the points behind them move the same way. Where a point moves against its piece, F dq differs
+from this sum by 2 |ds d|/(|ds| + |d|) times (f0 + f1)/2 - mean, of order 3 in the step where the law is smooth.
 
 Newton's method has the Jacobian in the space of ports and coordinates. With lists, and in steps of the last level, a
 line search finds the minimum. A step that it does not solve is halved. Loads that follow from the motion (normal
@@ -23,9 +25,10 @@ show its error.
 
 A rigid point (`Law.COULOMB`), the only one on its port, slips under a given force, or its port is held at rest. A step in
 which a slipping port would reverse, or a port at rest is released, is halved up to the last level, and so is one in which
-a port under the law "tanh" gains energy. The constant force of a
-step lets a held port move and come back. The work of this motion is taken from that of the drive, as friction at rest does
-none.
+a port under the law "tanh" gains energy. At the end of such a step of the last level, the forces of all ports without
+velocity decide together which of them rest (`settle`), because one that stops or slips changes the forces that hold the
+others. The constant force of a step lets a held port move and come back. The work of this motion is taken from that of the
+drive, as friction at rest does none.
 
 `system` is a `march_rows_kernels.System` with `step_rows_kernels.Points`. A step of level k lasts a whole step over 2^k.
 """
@@ -52,12 +55,14 @@ from .motion_kernels import (
     advance_shear,
     find_point_load,
     find_port_residual,
+    find_pull,
     find_resultant,
     move_ports,
     pick_load,
     solve_linear,
     store_base,
     subtract_step,
+    sum_products,
 )
 from .step_rows_kernels import VECTOR, WIDTH, Law, Step, Value
 
@@ -78,6 +83,8 @@ LOAD_RESIDUAL = 1e-11  # change of the loads relative to the resultant
 # Largest velocity of a port at rest, relative to the change by its friction in a whole step: ten times that by the largest
 # compliance of ports that share a force (`systems.REDUNDANT`)
 CREEP = 1e-7
+MAX_PIVOTS = 100  # changes of ports between rest and slip at an instant
+MAX_OVERLOAD = 1e-9  # relative excess over the static friction that is attributed to round-off
 TINY = 1e-150  # m, in place of no path; its square is not zero
 
 
@@ -723,11 +730,11 @@ def find_loads(system, row, fraction, is_solved):
 
 
 @njit(**NJIT_CALL)
-def is_held(points, p):
-    """Return whether port p is held at rest by its rigid point."""
+def is_held(memory, points, p):
+    """Return whether port p is held at rest by its rigid point, according to the first entry of `memory` of its block."""
     block = points.blocks.first[p]
     is_rigid = block < points.blocks.first[p + 1] and points.blocks.law[block] == Law.COULOMB
-    return is_rigid and points.memory[block, 0] == 0
+    return is_rigid and memory[block, 0] == 0
 
 
 @njit(**NJIT_CALL)
@@ -738,9 +745,10 @@ def is_shortest(system, level):
 
 @njit(**NJIT_CALL)
 def find_event(system, level, drive):
-    """Return whether a rigid point stops or is released, or gains energy, within the trial step.
+    """Return whether a rigid point stops or is released within the trial step.
 
-    A step of the last level is not searched again: a rigid point changes its regime there.
+    A step of the last level is not searched again. Its points that stop get the direction 0 here; `settle` then finds which
+    ports rest at its end.
 
     Parameters
     ----------
@@ -754,7 +762,6 @@ def find_event(system, level, drive):
     points = system.points
     moves = system.ports.values
     duration = system.options.step / (1 << level)
-    is_last = is_shortest(system, level)
     is_found = False
     is_any_held = False
     for block in range(points.blocks.law.size):
@@ -770,16 +777,17 @@ def find_event(system, level, drive):
         round_off = RESIDUAL * abs(moves[Port.SLIDE, p])
         is_reversed = direction * moves[Port.INCREMENT, p] < -creep * duration - round_off
         is_found = is_found or is_reversed or direction * moves[Port.END_VELOCITY, p] < -creep
-    if is_found and not is_last:
+    if not is_found:
+        return is_any_held and find_overload(system, system.state[2], drive) >= 0
+    if not is_shortest(system, level):
         return True
 
-    # Ports that creep stop with the port that has reversed, because one motion of the modes may move both. No port is
-    # released in this step: the forces of the ports that stop are known only in the next one.
-    for block in range(points.blocks.law.size if is_found else 0):
+    # Ports that creep stop with the port that has reversed, because one motion of the modes may move both.
+    for block in range(points.blocks.law.size):
         speed = points.memory[block, 0] * moves[Port.END_VELOCITY, points.blocks.port[block]]
         if points.blocks.law[block] == Law.COULOMB and speed < find_creep(system, block):
             points.trial[block, 0] = 0.0
-    return is_any_held and not is_found and release_port(system, drive, is_last)
+    return True
 
 
 @njit(**NJIT_CALL)
@@ -813,23 +821,23 @@ def find_creep(system, block):
 
 
 @njit(**NJIT_CALL)
-def release_port(system, drive, is_last):
-    """Return whether a port at rest is released in the trial step, which can then be halved; the shortest step releases it.
+def find_overload(system, state, drive):
+    """Return the port at rest whose friction limit is reached first on the way to the forces that hold it, or -1.
 
-    Of the ports whose holding force exceeds its limit, that with the largest ratio is released.
+    The forces change in proportion from those of the step before to those at this instant, `Port.HOLD`. Where kinetic is
+    below static friction, the order decides which ports slip.
 
     Parameters
     ----------
     system : march_rows_kernels.System
-        Arrays of the march, changed in place.
+        Arrays of the march; the points have their forces at the end of a step.
+    state : (2 n,) array
+        Modal coordinates and velocities.
     drive : float
-        Drive at the end of the step [m s-2].
-    is_last : bool
-        Whether the step cannot be halved.
+        Drive at this instant [m s-2].
     """
     points = system.points
     ports = system.ports
-    # Row 2 of the state is that at the end of the trial step, and so are the forces of the points.
     for p in range(ports.values.shape[1]):
         ports.newton.residual[p] = 0.0
         for block in range(points.blocks.first[p], points.blocks.first[p + 1]):
@@ -837,24 +845,100 @@ def release_port(system, drive, is_last):
                 ports.newton.residual[p] += find_rigid_force(points, block)
             else:
                 ports.newton.residual[p] += sum_points(points, block, Value.END)
-    normal.find_holds(system, system.state[2], drive)
-    worst = -1
-    largest = 1.0
+    normal.find_holds(system, state, drive)
+    first = -1
+    largest = 0.0
     for p in range(ports.values.shape[1]):
-        if ports.values[Port.HELD, p] == 0:
-            continue
-        block = points.blocks.first[p]
-        hold = ports.values[Port.HOLD, p]
-        limit = points.numbers[block, 0] * pick_load(points.values[block], Value.END_LOAD, hold)
-        hold = abs(hold)
-        if hold > largest * limit:
-            worst = p
-            largest = hold / limit if limit > 0 else np.inf
-    if worst < 0:
-        return False
-    if is_last:
-        points.trial[points.blocks.first[worst], 0] = np.sign(ports.values[Port.HOLD, worst])
-    return not is_last
+        if ports.values[Port.HELD, p] > 0:
+            hold = ports.values[Port.HOLD, p]
+            change = abs(hold - ports.values[Port.EARLIER, p]) + TINY_LOAD
+            beyond = (abs(hold) - find_static_limit(points, p, hold)) / change
+            if beyond > largest:
+                first = p
+                largest = beyond
+    return first
+
+
+@njit(**NJIT_CALL)
+def find_static_limit(points, p, direction):
+    """Return the static friction [N] of the rigid point of port p against a slide in a direction."""
+    block = points.blocks.first[p]
+    return points.numbers[block, 0] * pick_load(points.values[block], Value.END_LOAD, direction)
+
+
+@njit(**NJIT_CALL)
+def settle(system, drive):
+    """Find which ports without velocity rest and which slip at the end of a step in which rigid friction changed its regime.
+
+    Rest must not need more than the static friction, and a port that begins to slip must accelerate in the direction of its
+    slip. A port that violates its condition changes sides, until none does. With kinetic below static friction several
+    states may be possible: those that were released and can rest while the others slip are held again.
+
+    Parameters
+    ----------
+    system : march_rows_kernels.System
+        Arrays of the march, changed in place.
+    drive : float
+        Drive at this instant [m s-2].
+    """
+    points = system.points
+    moves = system.ports.values
+    n_released = 0
+    for _ in range(MAX_PIVOTS):
+        p = find_violation(system, drive)
+        if p < 0:
+            break
+        is_released = moves[Port.RELEASED, p] > 0
+        n_released += 0 if is_released else 1
+        moves[Port.RELEASED, p] = 0.0 if is_released else 1.0
+        direction = 0.0 if is_released else np.sign(moves[Port.HOLD, p])
+        points.trial[points.blocks.first[p], 0] = direction
+
+    for p in range(moves.shape[1]):
+        if n_released > 1 and moves[Port.RELEASED, p] > 0:
+            block = points.blocks.first[p]
+            direction = points.trial[block, 0]
+            points.trial[block, 0] = 0.0
+            if find_violation(system, drive) >= 0:
+                points.trial[block, 0] = direction
+    for block in range(points.blocks.law.size):
+        if points.blocks.law[block] == Law.COULOMB:
+            points.memory[block, 0] = points.trial[block, 0]
+            points.values[block, Value.START] = find_rigid_force(points, block)
+            moves[Port.RELEASED, points.blocks.port[block]] = 0.0
+
+
+@njit(**NJIT_CALL)
+def find_violation(system, drive):
+    """Return a port that can neither stay at rest nor begin to slip in its direction, or -1.
+
+    The row `Port.RELEASED` names the ports that begin to slip.
+
+    Parameters
+    ----------
+    system : march_rows_kernels.System
+        Arrays of the march, changed in place.
+    drive : float
+        Drive at this instant [m s-2].
+    """
+    points = system.points
+    ports = system.ports
+    moves = ports.values
+    state = system.state[0]
+    for p in range(moves.shape[1]):
+        moves[Port.HELD, p] = 1.0 if is_held(points.trial, points, p) else 0.0
+    overload = find_overload(system, state, drive)
+    for p in range(moves.shape[1]):
+        if p == overload:
+            return p
+        if moves[Port.RELEASED, p] > 0 and moves[Port.HELD, p] == 0:
+            direction = points.trial[points.blocks.first[p], 0]
+            push = find_pull(system, state, drive, p)
+            push -= sum_products(ports.grip[p], moves[Port.HOLD])
+            least = -MAX_OVERLOAD * ports.grip[p, p] * find_static_limit(points, p, direction)
+            if direction * push < least:
+                return p
+    return -1
 
 
 @njit(**NJIT_CALL)

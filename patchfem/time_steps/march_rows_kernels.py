@@ -36,6 +36,7 @@ class Port(IntEnum):
       decay of its velocity by the viscosity of its points
     - VISCOSITY: of the points at rest [N s/m]
     - MOVE: increment of the points [m]
+    - RELEASED: 1 while a port begins to slip at an instant
     """
 
     SLIDE = 0
@@ -58,6 +59,7 @@ class Port(IntEnum):
     DAMPING = 17
     VISCOSITY = 18
     MOVE = 19
+    RELEASED = 20
 
 
 class Shear(IntEnum):
@@ -170,7 +172,7 @@ class Ports(NamedTuple):
       that a constant force on another port takes away; C and G in `march_kernels`
     - grip (P, P): acceleration of a port that a force on another port takes away [1/kg]
     - redundant (P,): compliance of a port at rest relative to its own, which determines the forces of more ports than modes
-    - values (20, P): see `Port`
+    - values (21, P): see `Port`
     - newton: workspace of Newton's method
     - contact (11,): numbers of the heave and pitch ports (-1 for none), then the results of `path_mean` in the order of
       `contact.set_arrays.PathMean`: slopes of the contact energy by heave [N] and pitch [N m], and their derivatives

@@ -372,24 +372,41 @@ def solve_holds(system, state, drive):
         Drive at this instant [m s-2].
     """
     ports = system.ports
-    structure = system.structure
-    n = structure.modes.shape[1]
     n_ports = ports.values.shape[1]
 
     # Ports at rest have no acceleration: grip . hold = acceleration without their forces.
     for p in range(n_ports):
-        if ports.values[Port.HELD, p] == 0:
-            continue
-        total = 0.0
-        for i in range(n):
-            acceleration = -structure.modes[1, i] * drive - structure.modes[0, i] * state[i]
-            acceleration -= sum_products(structure.damping[i], state[n:])
-            total += ports.rows[p, i] * acceleration
-        ports.newton.residual[p] = total
+        if ports.values[Port.HELD, p] > 0:
+            ports.newton.residual[p] = find_pull(system, state, drive, p)
 
     solve_held(system)
     for p in range(n_ports):
         ports.values[Port.HOLD, p] = ports.newton.residual[p]
+
+
+@njit(**NJIT_CALL)
+def find_pull(system, state, drive, p):
+    """Return the acceleration [m s-2] of port p without the forces on ports.
+
+    Parameters
+    ----------
+    system : march_rows_kernels.System
+        Arrays of the march.
+    state : (2 n,) array
+        Modal coordinates and velocities.
+    drive : float
+        Drive at this instant [m s-2].
+    p : int
+        Number of the port.
+    """
+    structure = system.structure
+    n = structure.modes.shape[1]
+    total = 0.0
+    for i in range(n):
+        acceleration = -structure.modes[1, i] * drive - structure.modes[0, i] * state[i]
+        acceleration -= sum_products(structure.damping[i], state[n:])
+        total += system.ports.rows[p, i] * acceleration
+    return total
 
 
 @njit(**NJIT_CALL)

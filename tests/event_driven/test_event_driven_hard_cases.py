@@ -1,5 +1,6 @@
 """Hard cases of `event_driven`: the right motion, or an end in a sentence."""
 
+import march_rigs
 import numpy as np
 import pytest
 from event_driven_cases import coulomb, make_modes, make_oscillator
@@ -145,6 +146,34 @@ def test_interfaces_with_the_same_slide_share_their_force(kinetic):
         assert two[name] == pytest.approx(one[name], rel=1e-6)
     assert two["stick_fraction_2"] == pytest.approx(one["stick_fraction"], rel=1e-6)
     assert two["loop_area_2"] == pytest.approx(two["loop_area"] * 5 / 3, rel=1e-6)
+
+
+@pytest.mark.parametrize("stiffness", [1.0, 30.0])
+def test_exact_rigid_interfaces_that_turn_back_with_an_elastic_one(stiffness):
+    """Three rigid interfaces beside an elastic-plastic one on one slide move as one of their sum.
+
+    The elastic one, whose turn was seen first, let some of the rigid ones slip on while others rested: the work was wrong
+    by up to 0.8 %.
+    """
+    spring = masing.from_elements([stiffness], [0.02])
+    loads, kinetics = np.array([0.1, 0.15, 0.25]), np.array([0.98, 0.87, 0.82])
+    laws = [spring, *(coulomb(1.0, kinetic) for kinetic in kinetics)]
+    several = make_rig_case(laws, [1.0, *loads], np.ones((4, 1)), [1.7])
+    mean = coulomb(1.0, loads @ kinetics / loads.sum())
+    single = make_rig_case([spring, mean], [1.0, loads.sum()], np.ones((2, 1)), [1.7])
+    found, expected = (runs.run_case(case).values for case in (several, single))
+    for name in ("friction_work", AMPLITUDE, "loop_area"):
+        assert found[name] == pytest.approx(expected[name], rel=1e-8)
+
+
+def test_exact_peak_of_a_force_that_jumps_beyond_its_limit():
+    """Where the stop of one face releases another, the force on that one reaches its static limit within the jump."""
+    spec = march_rigs.draw_spec(20310001, march_rigs.STICKING_LAWS, (2, 3, 4))
+    face = spec["faces"][1]
+    for method in ("exact", "march"):
+        model = march_rigs.make_model(spec, f'tolerance = 1e-2\nmethod = "{method}"\n')
+        peak = pf.run(model, say=lambda line: None).measures["friction_force_peak_2"].value
+        assert peak == pytest.approx(face["keys"]["static"] * face["load"], rel=1e-9)
 
 
 def test_chatter_of_many_interfaces_on_many_modes():

@@ -34,6 +34,7 @@ UNITS = {
 # Relative error of the references: the round-off of a period of 7 digits in the work of a transient
 REFERENCE_ERROR = 3e-5
 LAWS = ("coulomb", "elastic-plastic", "tanh", "nonlocal", "iwan", "bouc-wen", "lugre")
+STICKING_LAWS = ("coulomb", "elastic-plastic")
 KINDS = ("sine", "sine", "tones", "record", "release")
 # Measures that check a run, and those of a motion that does not repeat
 CHECKS = ("energy_balance", "work_check", "drift")
@@ -202,11 +203,11 @@ def score_drawn_rig(spec: dict, tolerance: float = 1e-2) -> Score | None:
 # ---- drawn rigs
 
 
-def draw_spec(seed: int) -> dict:
-    """Return the spec of a random rig: 1 to 5 modes, 1 to 4 faces of any law, driven or released."""
+def draw_spec(seed: int, laws: tuple = LAWS, counts: tuple = (1, 1, 2, 3, 4)) -> dict:
+    """Return the spec of a random rig: 1 to 5 modes, driven or released, a number of faces from `counts` with these laws."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 6))
-    n_faces = int(rng.choice([1, 1, 2, 3, 4]))
+    n_faces = int(rng.choice(counts))
     omega = 2 * np.pi * np.sort(rng.uniform(60, 400, n))
     kind = KINDS[rng.integers(len(KINDS))]
     drive = omega[0] * rng.uniform(0.6, 1.4)
@@ -218,7 +219,7 @@ def draw_spec(seed: int) -> dict:
     output = rng.uniform(-0.5, 0.8, n)
     base[0], output[0] = rng.uniform(0.5, 0.9), 1.0
     loads = rng.uniform(0.1, 1.2, n_faces) * mass * acceleration / 0.4 / n_faces
-    faces = [_draw_face(rng, load, travel, drive, can_vary=n_faces == 1) for load in loads]
+    faces = [_draw_face(rng, laws, load, travel, drive, can_vary=n_faces == 1) for load in loads]
 
     # The first tone is the drive of a sine; a record has four rows per cycle.
     period = 2 * np.pi / (omega[0] if kind == "release" else drive)
@@ -243,9 +244,9 @@ def draw_spec(seed: int) -> dict:
     }  # fmt: skip
 
 
-def _draw_face(rng, load: float, travel: float, drive: float, *, can_vary: bool) -> dict:
-    """Return a face of a random law; its load may oscillate."""
-    law = LAWS[rng.integers(len(LAWS))]
+def _draw_face(rng, laws: tuple, load: float, travel: float, drive: float, *, can_vary) -> dict:
+    """Return a face of a random law of `laws`; its load may oscillate if it `can_vary`."""
+    law = laws[rng.integers(len(laws))]
     static = rng.uniform(0.15, 0.8)
     speed = drive * travel
     stretch = travel * 10 ** rng.uniform(-2, -0.3)

@@ -95,6 +95,11 @@ weaken, equation 2.17 as printed), several states can be in equilibrium. The run
 states that lie in the direction of its last time steps, and continues from the state with the lower energy. The energy
 difference between the states counts as dissipated.
 
+**Rigid friction.** If the kinetic friction of law `coulomb` is below the static one, a stop or a release at one of several
+interfaces may leave more than one motion possible. The interface slips whose limit is reached first while all forces
+change in proportion. Where the friction of some interfaces falls much more slowly than that of others, a joint may take
+another motion. Interfaces that the modes cannot move apart share their force at rest in proportion to their friction.
+
 **Directions.** The surfaces of an interface slide along one direction.
 
 **Modes.** The rig is linear except for its joints, `[structure.stiffening]` and an interlocking spring of
