@@ -81,7 +81,7 @@ if TYPE_CHECKING:
         view,
     )
 
-__version__ = "3.0.0a7"
+__version__ = "3.0.0a8"
 __all__ = [
     "FitOptions",
     "Measure",
