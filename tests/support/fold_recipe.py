@@ -1,8 +1,8 @@
-"""Recipe of random rigs whose curves have folds, and of self-excited rigs with limit cycles, for an own integrator.
+"""Recipe of random rigs with folds, with limit cycles and with backbones, for own programs and earlier releases.
 
-Rig k has the seed FIRST_FOLD_SEED + k or FIRST_CYCLE_SEED + k, 1 to 3 masses or modes, and the laws of `curve_campaign` in
-turn. A rig with folds has a cubic spring. In a self-excited rig one mode has negative damping, and the release is short,
-because the limit cycles follow from the map of a period.
+Rig k has the seed FIRST_FOLD_SEED + k, FIRST_CYCLE_SEED + k or FIRST_BACKBONE_SEED + k, 1 to 3 masses or modes, and the
+laws of `curve_campaign` in turn. A rig with folds has a cubic spring. In a self-excited rig one mode has negative damping,
+and the release is short, because the limit cycles follow from the map of a period.
 """
 
 import numpy as np
@@ -11,6 +11,8 @@ from curve_campaign import LAWS, make_chain
 
 FIRST_FOLD_SEED = 20303100
 FIRST_CYCLE_SEED = 20303200
+FIRST_BACKBONE_SEED = 20303400
+N_AMPLITUDES = 9  # of a backbone
 N_RIGS = 24
 
 
@@ -59,3 +61,15 @@ def make_cycle_scene(seed: int, cycles: int = 3, ratio: float = 0.5) -> str:
             f"slide = {slide:.5f}\noutput = {output:.5f}\n"
         )
     return f'{text}[drive]\nkind = "free"\ndisplacement = "{ratio * amplitude:.6g} m"\ncycles = {cycles}\n'
+
+
+def make_backbone_scene(seed: int) -> tuple[str, str]:
+    """Return the scene of a rig whose first mode has a backbone, and its amplitudes."""
+    number = seed - FIRST_BACKBONE_SEED
+    text, omega, acceleration = make_chain(seed, number, 1 + number % 3, None)
+    size = acceleration / omega**2
+    amplitudes = f"{0.01 * size:.6g} m..{3 * size:.6g} m:{N_AMPLITUDES}"
+    return (
+        f'{text}[drive]\nkind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"\ncycles = 3\n',
+        amplitudes,
+    )
