@@ -265,7 +265,7 @@ class FreeShooting(ExtendedShooting):
         # Change over half a period, relative to the motion, that counts as none
         change_tol = 1e-10
         # Steps of the whole search, relative to those of the first periods
-        max_steps_ratio = 30.0
+        max_steps_ratio = 60.0
         # Smallest cosines between the start of the search and a motion. At a larger angle the motion is that of another
         # mode, or one whose harmonics are in resonance. A force at the output moves the modes otherwise than the free
         # motion.

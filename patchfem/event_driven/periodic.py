@@ -344,6 +344,8 @@ class Shooting:
             self.record.cycles[:, Cycle.WINDOW] = -1.0
         self.blank = Record(*(array.copy() for array in self.record))
         self.run = kernel_cache.load_compiled_module("event_driven.engine_kernels").run_case
+        # Interfaces whose laws remember reversal points
+        self.loops = np.flatnonzero(case.rig.faces[:, Face.LAW] == MASING)
         # Signs of all entries of the state of the opposite motion
         self.signs = State(*(np.ones_like(array) for array in self.state))
         mirror_state(self.signs, case.rig.modes.shape[1], odd_laws)
@@ -365,6 +367,10 @@ class Shooting:
     def find_size(self, state: State) -> float:
         """Return the largest coordinate or velocity of the modes in a state."""
         return float(np.abs(state.y[: 2 * self.case.rig.modes.shape[1]]).max())
+
+    def find_slides(self, state: State) -> np.ndarray:
+        """Return the relative displacements (i,) [m] of the interfaces in a state."""
+        return self.case.rig.rows[0] @ state.y[: self.case.rig.modes.shape[1]]
 
     def advance(self, state: State) -> State:
         """Return the state a period after another one, whose clock starts at 0.
@@ -543,7 +549,7 @@ class Shooting:
         # corrections are exact to MAX_KINKED_CHANGE.
         max_force_ratio = 1 + 10 * MAX_KINKED_CHANGE
         faces = self.case.rig.faces
-        for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
+        for i in self.loops:
             memory = self.state.memory[i]
             forces = memory[Memory.STACK + 1 : Memory.STACK + 2 * int(memory[Memory.COUNT]) : 2]
             limit = faces[i, Face.NUMBERS + masing.LIMIT]
@@ -659,9 +665,8 @@ class Shooting:
 
     def follows_reversals(self, state: State) -> bool:
         """Return whether all laws with reversal points are beyond their last one in the direction of their motion."""
-        faces = self.case.rig.faces
-        slides = self.case.rig.rows[0] @ state.y[: self.case.rig.modes.shape[1]]
-        for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
+        slides = self.find_slides(state)
+        for i in self.loops:
             memory = state.memory[i]
             count = int(memory[Memory.COUNT])
             slide = slides[i] - memory[Memory.ORIGIN]

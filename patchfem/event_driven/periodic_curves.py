@@ -19,7 +19,6 @@ from ..core import NotConverged
 from .cases import Case, make_arrays
 from .laws import masing
 from .periodic import (
-    MASING,
     MAX_CHANGE,
     MAX_KINKED_CHANGE,
     MAX_STABLE_MULTIPLIER,
@@ -93,11 +92,11 @@ class ExtendedShooting(Shooting, ABC):
         end = super().advance(before)
         end.y[self.extra] += self.find_conditions(before)
 
-        faces = self.case.rig.faces
-        slides = self.case.rig.rows[0] @ end.y[: self.case.rig.modes.shape[1]]
+        slides = self.find_slides(end)
         ranges = self.find_ranges()
-        for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
-            masing.remember_loop(faces[i, Face.NUMBERS :], end.memory[i], ranges[i], slides[i])
+        for i in self.loops:
+            numbers = self.case.rig.faces[i, Face.NUMBERS :]
+            masing.remember_loop(numbers, end.memory[i], ranges[i], slides[i])
         return end
 
     def has_same_regime(self, before: State) -> bool:
@@ -153,10 +152,10 @@ class ExtendedShooting(Shooting, ABC):
     def load_loops(self, state: State) -> State:
         """Return a copy of a state with the forces that belong to the reversal points of its loops."""
         state = copy_state(state)
-        faces = self.case.rig.faces
-        slides = self.case.rig.rows[0] @ state.y[: self.case.rig.modes.shape[1]]
-        for i in np.flatnonzero(faces[:, Face.LAW] == MASING):
-            masing.load_reversals(faces[i, Face.NUMBERS :], state.memory[i], slides[i])
+        slides = self.find_slides(state)
+        for i in self.loops:
+            numbers = self.case.rig.faces[i, Face.NUMBERS :]
+            masing.load_reversals(numbers, state.memory[i], slides[i])
         return state
 
     def find_motion_multipliers(self, known: PeriodMap) -> np.ndarray:

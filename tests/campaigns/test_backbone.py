@@ -4,6 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from fold_recipe import FIRST_BACKBONE_SEED, make_backbone_scene
 from scene_texts import IWAN, make_shaken_block
 from scipy.integrate import solve_ivp
 
@@ -314,6 +315,20 @@ def test_curve_continues_beyond_a_fold():
     assert (np.diff(whole.frequency) < 0).all()
     assert whole.frequency[1:] == pytest.approx(beyond.frequency, rel=1e-6)
     assert whole.damping[1:] == pytest.approx(beyond.damping, rel=1e-5)
+
+
+def test_motion_of_a_strongly_damped_mode_is_found_without_smaller_ones():
+    """Three masses with laws nonlocal, bouc-wen and lugre: a free motion whose search needs new derivatives often is found
+    from that of sticking contacts, and is that which is followed from half of the amplitude."""
+    scene, _ = make_backbone_scene(FIRST_BACKBONE_SEED + 11)
+    amplitude = 60.8134e-6
+    found = [
+        pf.backbone(scene, amplitudes=amplitudes, method="balance").sel(balance_amplitude=amplitude)
+        for amplitudes in ([amplitude, 66.482e-6], [0.5 * amplitude, amplitude])
+    ]
+    for name in ("balance_frequency", "balance_damping"):
+        at_once, followed = (float(curves[name]) for curves in found)
+        assert at_once == pytest.approx(followed, rel=1e-6)
 
 
 CROWNED = (

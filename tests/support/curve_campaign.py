@@ -37,9 +37,25 @@ AMPLITUDE = "relative_displacement_amplitude"
 
 def make_structure(seed: int) -> tuple[str, float, float]:
     """Return the structure of a rig as text, its lowest frequency without friction [rad/s], and a drive [m/s2]."""
-    rng = np.random.default_rng(seed)
     number = seed - FIRST_SEED
-    n = 1 + number % 3
+    return make_chain(seed, number, 1 + number % 3, (0.005, 0.05) if number % 6 == 5 else None)
+
+
+def make_chain(
+    seed: int, number: int, n: int, cubic: tuple[float, float] | None
+) -> tuple[str, float, float]:
+    """Return a chain of `n` masses as text, its lowest frequency without friction [rad/s], and a drive [m/s2].
+
+    Parameters
+    ----------
+    seed : int
+    number : int
+        Number of the rig, which says with which law the interfaces begin.
+    n : int
+    cubic : (2,) tuple of float or None
+        Range of the part of a cubic spring in the stiffness at the amplitude a/omega^2.
+    """
+    rng = np.random.default_rng(seed)
     n_faces = int(rng.integers(1, n + 1))
     omega = 2 * np.pi * rng.uniform(60, 200)
     masses = rng.uniform(0.5, 1.5, n)
@@ -66,9 +82,9 @@ def make_structure(seed: int) -> tuple[str, float, float]:
         text += f"[[structure.interface]]\nbetween = [{mass}, 0]\n"
         text += write_law(rng, law, sizes, has_patch=False)
         text += f'load = "{limit / static:.6g} N"\n'
-    if number % 6 == 5:
-        cubic = rng.uniform(0.005, 0.05) * springs[0] * (lowest**2 / acceleration) ** 2
-        text += f'[structure.stiffening]\ncubic = "{cubic:.6g} N/m^3"\n'
+    if cubic is not None:
+        coefficient = rng.uniform(*cubic) * springs[0] * (lowest**2 / acceleration) ** 2
+        text += f'[structure.stiffening]\ncubic = "{coefficient:.6g} N/m^3"\n'
     return text, lowest, acceleration
 
 
