@@ -5,6 +5,7 @@ import numpy as np
 from ..core import MIN_LOAD
 from .rows import Law
 
+MIN_LENGTH = 1e-30  # length [m] in place of no length, by which a stiffness is divided
 # Number of each law, and the attributes of a law of `friction` in the order of its numbers; those with a star are per
 # newton of load
 POINT_LAWS = {
@@ -38,6 +39,5 @@ def list_point_law(name: str, law, load) -> list[float | np.ndarray]:
         number = getattr(law, attribute.rstrip("*"))
         if attribute.endswith("*"):
             number = number * np.maximum(load, MIN_LOAD)
-        # 1e-30 m in place of no length, by which a stiffness is divided
-        numbers[column] = np.maximum(number, 1e-30) if attribute == "length" else number
+        numbers[column] = np.maximum(number, MIN_LENGTH) if attribute == "length" else number
     return numbers
