@@ -209,13 +209,11 @@ def advance(rig, state, record, t_end, cycle):
     rtol = rig.settings[Setting.RTOL]
     longest = rig.settings[Setting.LONGEST_STEP]
     in_window = record.cycles[cycle, Cycle.WINDOW] >= 0
-    # Rounding may let a motion that stops exactly at the end of the previous cycle reach into this one. An end within
-    # MIN_SEEN of a period therefore belongs to the previous cycle.
+    # By rounding, a motion that stops at the end of a cycle may reach into the next one, to which it does not belong.
     first_seen = MIN_SEEN * rig.settings[Setting.PERIOD]
     if cycle > 0:
         first_seen += record.cycles[cycle - 1, Cycle.END]
-    # The step error is that of the states before the first integral. On a bench it includes the integrals: besides the
-    # friction work no state may depend on the path.
+    # The step error is that of the states before the first integral; on a bench, whose states follow the path, of all.
     n_checked = find_integrals(rig)
     if rig.settings[Setting.IS_BENCH] > 0:
         n_checked += N_FACE_INTEGRALS * rig.faces.shape[0]

@@ -774,7 +774,7 @@ def find_event(system, level, drive):
         # Friction gains energy in a step that does not resolve a reversal. Other ports at rest may hold a slipping port too,
         # which then creeps.
         creep = find_creep(system, block)
-        round_off = RESIDUAL * abs(moves[Port.SLIDE, p])
+        round_off = RESIDUAL * find_slide_size(system, p)
         is_reversed = direction * moves[Port.INCREMENT, p] < -creep * duration - round_off
         is_found = is_found or is_reversed or direction * moves[Port.END_VELOCITY, p] < -creep
     if not is_found:
@@ -788,6 +788,19 @@ def find_event(system, level, drive):
         if points.blocks.law[block] == Law.COULOMB and speed < find_creep(system, block):
             points.trial[block, 0] = 0.0
     return True
+
+
+@njit(**NJIT_CALL)
+def find_slide_size(system, p):
+    """Return the size [m] to which the round-off of the slide of port p is relative: the sum of the parts of all modes.
+
+    These parts may cancel, so that the slide itself is much smaller.
+    """
+    size = abs(system.ports.values[Port.SLIDE, p])
+    total = 0.0
+    for k in range(system.state.shape[1] // 2):
+        total += abs(system.ports.rows[p, k] * system.state[0, k])
+    return max(size, total)
 
 
 @njit(**NJIT_CALL)

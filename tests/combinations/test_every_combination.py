@@ -219,9 +219,9 @@ def test_stiffness_under_an_approach_has_the_loop_of_the_load():
         )
 
 
-LONG = {("lower", "order 2"), ("pitch", "order 2")}  # combinations that .ci/run runs
+LONG_TESTS = {("lower", "order 2"), ("pitch", "order 2")}  # combinations that .ci/run runs
 COMBINATIONS = [
-    pytest.param(effect, law, marks=pytest.mark.long if (effect, law) in LONG else ())
+    pytest.param(effect, law, marks=pytest.mark.long if (effect, law) in LONG_TESTS else ())
     for effect in EFFECTS
     for law in LAWS
 ]

@@ -46,7 +46,7 @@ def test_saved_errors_are_reproduced(engines, problem, table):
     errors = {(row["problem"], row["engine"], row["knob"]): row["error"] for row in table["rows"]}
     for where in ("decay", "block", "two"):
         for name, settings in (
-            ("march", (200, 800)),
+            ("march", (200, 800, 6400)),
             ("newmark, and force", (200, 800)),
             ("euler, tanh", (1000,)),
             ("duhamel, static branch", (200, 800)),

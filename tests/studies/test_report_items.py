@@ -32,4 +32,4 @@ def test_always_docstring_states_the_counts_of_items(items):
         for verdict in items.VERDICTS
     ]
     assert counts == [68, 8, 1, 2]
-    assert "79 items 68 work, 8 in part, one is missing, and of two" in items.__doc__
+    assert "79 items 68 work, 8 in part, one cannot be computed, and of two" in items.__doc__
