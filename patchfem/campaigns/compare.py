@@ -96,7 +96,7 @@ def write_common_traces(comparison: Comparison, folder: Path) -> list[Path]:
     curves = comparison.evidence.curves
     traces = [comparison.before, comparison.after]
     if curves is not None and np.isfinite(curves.before).any():
-        traces = [Profile(curves.x, z, "trace") for z in (curves.before, curves.after)]
+        traces = [Profile(curves.x, z, "trace") for z in curves.heights]
     paths = []
     for side, trace in zip(SURFACE_NAMES, traces, strict=True):
         flat = level(resample_evenly(trace))
